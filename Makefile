@@ -5,7 +5,7 @@ PYTEST := $(BIN)/python -m pytest -q -n 2 --dist loadfile --no-loadscope-reorder
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help demo study study-peers study-league report verify smoke test check lint docs links figures fuzz stress bench speeds \
+.PHONY: help demo study study-peers study-league report publish publish-plan verify smoke test check lint docs links figures fuzz stress bench speeds \
 	coverage clean distclean compiled \
 	compiled-essential setup-run \
 	setup-test setup-verify setup-dev FORCE
@@ -36,6 +36,12 @@ study-peers: setup-run ## other programs, in environments of their own, and ours
 study-league: setup-run ## all programs and ours on the open scenes of the league (an hour)
 	$(BIN)/python -m studies.exchange.peers.main --league
 	$(BIN)/organbench report
+
+publish: setup-run compiled ## all that is published, again, by this commit on this machine (hours; goes on where it was interrupted)
+	$(BIN)/python -m studies.report.release
+
+publish-plan: setup-run ## what `make publish` would do, and how long it takes
+	$(BIN)/python -m studies.report.release --dry-run
 
 verify: setup-verify docs ## before a release: oracles, campaigns, browsers, clusters, wheels, notebooks (half an hour)
 	$(BIN)/organbench verify

@@ -61,9 +61,9 @@ RENAMED = {"check": "mesh-check", "stress": "fuzz", "cost": "profile"}
 
 def scenes() -> list[str]:
     """Names of the scenes."""
-    from studies.scene.library import SCENES
+    from studies.scene.library import CUT, SCENES
 
-    return [scene.name for scene in SCENES]
+    return [scene.name for scene in (*SCENES, *CUT)]
 
 
 def organs() -> list[str]:

@@ -1,6 +1,7 @@
 """A scene as scene.json: all that another program needs, in SI units, as numbers and in words."""
 
 from collections.abc import Sequence
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from studies.exchange.words import (
     DAMPING_OF_MOTION,
     MATERIAL,
     PATHS,
+    cut_words,
     force_words,
     friction_words,
     lumen_words,
@@ -26,16 +28,23 @@ from studies.scene.scene import Scene
 
 SCHEMA, VERSION = "organbench-scene", 1
 """Raised when a reader of the old one would misread the new one."""
-OURS = ("alternation", "step_time", "frame_time", "frame_time_p99")
+OURS = (
+    *("alternation", "step_time", "frame_time", "frame_time_p99"),
+    *("cut_energy", "cut_momentum", "cut_limit", "cut_ms"),
+)
 """Metrics of what is inside of this program alone."""
+OF_CUTS = ("overlap", "piece_worst", "piece_sum_worst")
+"""Metrics of organs that are cut."""
 HELD, OUTER, LUMEN = "held_", "outer", "lumen"
 """Point data of the meshes: 1 at the nodes of a held region, of the outer surface, of the lumen's, else 0."""
 FILES = {"straight": "straight.vtu", "curved": "curved.vtu", "surface": "surface.vtu", "paths": "paths.csv"}
+CUT_FILES = {"straight": "cut_straight.csv", "curved": "cut_curved.csv"}
 
 
 def judged_metrics(scene: Scene) -> list[Metric]:
     """What an entry in this scene is judged by."""
-    metrics = [metric for metric in METRICS if metric.name not in OURS]
+    left_out = OURS if scene.cut is not None else (*OURS, *OF_CUTS)
+    metrics = [metric for metric in METRICS if metric.name not in left_out]
     return [m for m in metrics if m.quantity is None or allowed(scene, m.quantity)]
 
 
@@ -62,6 +71,7 @@ def description(scene: Scene, meshes: Sequence[GivenMesh], why_not_curved: str) 
         "obstacles": [obstacle_entry(obstacle) for obstacle in scene.obstacles],
         "paths": {"file": FILES["paths"], "words": PATHS},
         "lumen": lumen_entry(scene),
+        "cut": cut_entry(scene),
         "force": {"of": scene.probed.what, "number": scene.probed.number, "direction": list(scene.probed.direction)}
         | {"words": force_words(scene)},
         "judged": [metric_entry(metric) for metric in judged_metrics(scene)],
@@ -91,7 +101,7 @@ def mesh_entry(mesh: GivenMesh) -> dict[str, Any]:
         "file": FILES[mesh.kind],
         "cells": "quadratic tetrahedra, VTK's order" if mesh.cells.shape[1] == 10 else "tetrahedra",
         "nodes": len(mesh.points),
-        "outer_nodes": int(mesh.mesh.outer_count),
+        "outer_nodes": mesh.outer_count,
         "tetrahedra": len(mesh.cells),
         "sha256": mesh.digest,
         "volumes": dict(zip(mesh.volumes.names, mesh.volumes.measure(mesh.points).tolist(), strict=True)),
@@ -125,6 +135,18 @@ def lumen_entry(scene: Scene) -> dict[str, Any] | None:
         return None
     filling = {"times": list(lumen.filling.times), "factors": list(lumen.filling.values)}
     return {"content": lumen.content, "volume": filling, "words": lumen_words(lumen)}
+
+
+def cut_entry(scene: Scene) -> dict[str, Any] | None:
+    """Where the meshes are cut; None where they are not."""
+    cut = scene.cut
+    if cut is None:
+        return None
+    blade = cut.within and {"kind": type(cut.within).__name__.lower()} | asdict(cut.within)
+    plane = {"point": list(cut.plane.point), "normal": list(cut.plane.normal)}
+    return {"name": cut.name, "plane": plane, "within": blade, "contact": cut.contact, "files": CUT_FILES} | {
+        "words": cut_words(cut)
+    }
 
 
 def metric_entry(metric: Metric) -> dict[str, Any]:

@@ -14,6 +14,7 @@ from massspring.kernels.arrays.layout import BoundaryConditions
 from massspring.layout.state import State
 from massspring.methods.capabilities import Capabilities
 from studies.base.errors import StudyError
+from studies.exchange.precut import given_scene, reference_of
 from studies.metrics.run import Run
 from studies.metrics.timing.protocol import FrameTiming
 from studies.reference.load import Reference
@@ -81,13 +82,14 @@ def case_of_entry(record: Record) -> Case:
 
 
 def run_of_entry(record: Record, reference: Reference | None) -> Run:
-    """An entry with what it is judged by."""
+    """An entry with what it is judged by; reference: that of its scene, of a cut one before the cut too."""
     seconds = record.attributes.get(SECONDS)
     timing = None
     if seconds is not None:
         frame_ns = 1e9 * seconds * record.attributes["frame"]
         timing = FrameTiming(np.full((1, int(record.attributes["frames"])), frame_ns))
-    return Run(case_of_entry(record), record, reference, timing)
+    case = case_of_entry(record)
+    return Run(case, record, reference_of(case.scene, reference), timing)
 
 
 def entry_files(root: Path) -> list[Path]:
@@ -96,11 +98,11 @@ def entry_files(root: Path) -> list[Path]:
 
 
 def entries_beside(
-    root: Path, scenes: Iterable[Scene], reference_of: Callable[[Scene], Reference | None]
+    root: Path, scenes: Iterable[Scene], known: Callable[[Scene], Reference | None]
 ) -> tuple[list[Run], list[str]]:
     """The entries in `scenes`, judged by the references of these; and what cannot be read, a sentence each. A scene is
     the same whatever its reference's meshes and its number of frames."""
-    wanted = {_same(scene): scene for scene in scenes}
+    wanted = {_same(given): (given, scene) for scene in scenes for given in _given(scene)}
     found, problems = [], []
     for path in entry_files(root):
         try:
@@ -109,10 +111,17 @@ def entries_beside(
         except StudyError as problem:
             problems.append(str(problem))
             continue
-        scene = wanted.get(_same(run.case.scene))
-        if scene is not None:
-            found.append(replace(run, case=run.case.replaced(scene=scene), reference=reference_of(scene)))
+        given, scene = wanted.get(_same(run.case.scene), (None, None))
+        if given is not None and scene is not None:
+            found.append(replace(run, case=run.case.replaced(scene=given), reference=reference_of(given, known(scene))))
     return found, problems
+
+
+def _given(scene: Scene) -> list[Scene]:
+    try:
+        return [given_scene(scene)]
+    except StudyError:  # nobody was given it
+        return []
 
 
 def _same(scene: Scene) -> str:

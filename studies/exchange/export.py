@@ -10,8 +10,9 @@ import pandas as pd
 
 from studies.base.atomic import write_whole
 from studies.base.errors import StudyError
-from studies.exchange.description import FILES, HELD, LUMEN, OUTER, description
+from studies.exchange.description import CUT_FILES, FILES, HELD, LUMEN, OUTER, description
 from studies.exchange.meshes import STRAIGHT, GivenMesh, given_meshes
+from studies.exchange.precut import given_scene
 from studies.exchange.readme import readme
 from studies.exchange.starter import NAME, SOLVER
 from studies.geometry.files.grids import write_grid_file
@@ -27,13 +28,16 @@ def export(scene: Scene, folder: Path, nodes: int, rows: Sequence[Sequence[str]]
     """Writes the scene into `folder` with `nodes` vertices on its outer surface; the files, and why there is no curved
     mesh (nothing where there is one). rows: a body of ours, its error of force and of displacement [%], each as text.
 
-    Raises StudyError for a folder that is a file, and a mesh that cannot be made.
+    Of a scene with a cut the meshes are cut already. Raises StudyError for a folder that is a file, a mesh that cannot
+    be made, and a cut whose time matters.
     """
+    scene = given_scene(scene)
     if folder.exists() and not folder.is_dir():
         raise StudyError(f"{folder} is a file; give the name of a folder")
     meshes, why_not = given_meshes(scene, nodes)
     written = [_write_mesh(mesh, folder) for mesh in meshes]
     written.append(_write_surface(meshes, folder / FILES["surface"]))
+    written += [_write_cut(mesh, folder / CUT_FILES[mesh.kind]) for mesh in meshes if scene.cut is not None]
     written.append(folder / FILES["paths"])
     write_whole(written[-1], paths_table(scene).to_csv(index=False, float_format=f"%.{DIGITS}g").encode())
     found = rounded(description(scene, meshes, why_not))
@@ -77,6 +81,14 @@ def _write_surface(meshes: Sequence[GivenMesh], path: Path) -> Path:
     count = straight.mesh.outer_count
     data = {name: values[:count] for name, values in marks(straight).items() if name.startswith(HELD)}
     write_grid_file(path, straight.points[:count], {"triangle": straight.mesh.outer_triangles}, data)
+    return path
+
+
+def _write_cut(mesh: GivenMesh, path: Path) -> Path:
+    facets = mesh.cut_facets
+    names = [f"{side}_{number}" for side in ("behind", "front") for number in range(facets.shape[2])]
+    table = pd.DataFrame(facets.reshape(len(facets), -1), columns=names)
+    write_whole(path, table.to_csv(index=False).encode())
     return path
 
 

@@ -101,6 +101,12 @@ def _mesh_of(name: str, count: int, meshes: Sequence[GivenMesh]) -> GivenMesh:
     for mesh in meshes:
         if len(mesh.points) == count:
             return mesh
+    for mesh in meshes:
+        if count == len(mesh.points) - len(mesh.pairs):
+            raise StudyError(
+                f"{name}: positions of {count} nodes, but {FILES[mesh.kind]} has {len(mesh.points)}: the reader joined "
+                "those that lie at one place, which shuts the cut; read it without"
+            )
     known = " and ".join(f"{FILES[mesh.kind]} {len(mesh.points)}" for mesh in meshes)
     raise StudyError(
         f"{name}: positions of {count} nodes, but {known} at this number of vertices; they belong to another mesh "

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from massspring.layout.face_pairs import faces_behind
 from massspring.layout.probe_arrays import tip_depth
 from massspring.sources import source_fingerprint
 from massspring.world.obstacles import Obstacle, Probe
@@ -14,7 +15,8 @@ from studies.base.errors import StudyError
 from studies.exchange.entry import ENTRY, SECONDS, entry_name, outside
 from studies.exchange.fit import SAME, Fitting, fitted, force_at
 from studies.exchange.handed import read_force, read_handed
-from studies.exchange.meshes import given_meshes
+from studies.exchange.meshes import GivenMesh, given_meshes
+from studies.exchange.precut import given_scene
 from studies.runs.case import Case
 from studies.runs.indicators import sway
 from studies.runs.prepare import LUMEN
@@ -36,7 +38,7 @@ def entry_record(
     was exported; force: a CSV file with the probed force; seconds: computing time for a simulated second [s/s].
     Raises StudyError for whatever does not fit the scene.
     """
-    method = outside(name)
+    method, scene = outside(name), given_scene(scene)
     if seconds is not None and not 0.0 < seconds < np.inf:
         raise StudyError(f"{seconds} s of computing for a simulated second is not a time; give a positive number")
     handed = read_handed(path)
@@ -86,7 +88,16 @@ def measured(fitting: Fitting) -> dict[str, np.ndarray]:
         "mass": body.mass,
         "triangles": body.triangles,
         "tetrahedra": body.tetrahedra,
+        **_cut(mesh),
     }
+
+
+def _cut(mesh: GivenMesh) -> dict[str, np.ndarray]:
+    """The faces of a body that is cut; each kept volume is a piece."""
+    if mesh.scene.cut is None:
+        return {}
+    faces = faces_behind(mesh.body.triangles.astype(np.int64), mesh.pairs, len(mesh.points))
+    return {"cut_faces": faces, "cut_pairs": mesh.pairs, "cut_parts": np.arange(len(mesh.volumes.names))}
 
 
 def _depth(obstacle: Obstacle, x: np.ndarray, surface: np.ndarray, triangles: np.ndarray, t: float) -> float:
@@ -126,7 +137,7 @@ def _attributes(fitting: Fitting) -> dict[str, Any]:
         "volumes": len(names),
         "lumen_column": names.index(LUMEN) if LUMEN in names else -1,
         "warnings": "" if _has_moved(fitting) else STILL,
-    }
+    } | ({} if mesh.scene.cut is None else {"cut_frame": 0})
 
 
 def _has_moved(fitting: Fitting) -> bool:

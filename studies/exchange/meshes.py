@@ -1,19 +1,23 @@
 """The meshes on which positions are handed in: the straight and the curved one of a scene's organ."""
 
 import hashlib
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
 
 from massspring import Body
 from massspring.body.volumes import Volumes
+from massspring.layout.face_pairs import faces_behind
 from studies.base.errors import StudyError
 from studies.geometry import OrganMesh
+from studies.geometry.mesh.organ_mesh import boundary_triangles
 from studies.meshing.graded_mesh import mesh_at
+from studies.meshing.opened_mesh import opened_mesh
 from studies.meshing.quadratic_mesh import QuadraticMesh
 from studies.meshing.scene_mesh import mesh_for, patch_nodes
 from studies.runs.case import BodyRecipe
+from studies.runs.cutting import pieces_of
 from studies.runs.prepare import LUMEN, body_for
 from studies.scene.scene import Scene
 
@@ -26,12 +30,16 @@ GRAIN = 1e-7
 
 @dataclass(frozen=True, eq=False)
 class GivenMesh:
-    """A mesh of a scene's organ, and the body that stands on it where it is measured."""
+    """A mesh of a scene's organ, opened where the scene cuts it, and the body by which it is measured."""
 
     scene: Scene
     kind: str
     """STRAIGHT: linear tetrahedra; CURVED: quadratic ones, on the true surface where it is known."""
     mesh: OrganMesh | QuadraticMesh
+    outer_count: int
+    """Nodes of the outer surface before the cut."""
+    pairs: np.ndarray = field(default_factory=lambda: np.empty((0, 2), np.int64))
+    """Nodes behind the cut and in front of it, (p, 2)."""
 
     @property
     def points(self) -> np.ndarray:
@@ -51,9 +59,9 @@ class GivenMesh:
 
     @cached_property
     def recipe(self) -> BodyRecipe:
-        """Of the body: its nodes are those of the outer surface."""
+        """Of the body: its nodes are those of the outer surface before the cut."""
         kind = "quadratic" if self.kind == CURVED else "tetrahedral"
-        return BodyRecipe(kind, int(self.mesh.outer_count))
+        return BodyRecipe(kind, self.outer_count)
 
     @cached_property
     def body(self) -> Body:
@@ -62,7 +70,12 @@ class GivenMesh:
 
     @cached_property
     def volumes(self) -> Volumes:
-        """What is measured: the volume of the tissue as a whole, and that of a lumen that is filled."""
+        """What is measured: the volume of the tissue or of each of its pieces, and that of a lumen that is filled."""
+        if self.scene.cut is not None:
+            cells = self.body.tetrahedra.astype(np.int64)
+            piece = pieces_of(self.points, cells)
+            surfaces = {f"piece {k}": boundary_triangles(cells[piece == k]) for k in range(piece.max() + 1)}
+            return Volumes.closed_surfaces(self.body, surfaces)
         kept = self.body.kept
         if isinstance(kept, Volumes):
             return kept
@@ -71,6 +84,17 @@ class GivenMesh:
         inner = (self.body.triangles >= self.mesh.outer_count).all(axis=1)
         surfaces = {"wall": self.body.triangles, LUMEN: self.body.triangles[inner][:, ::-1]}
         return Volumes.closed_surfaces(self.body, surfaces)
+
+    @property
+    def cut_facets(self) -> np.ndarray:
+        """Boundary facets behind the cut and those at the same places in front of it, whose nodes have the same order,
+        (f, 2, 3) or (f, 2, 6)."""
+        mesh, n = self.mesh, len(self.points)
+        facets = mesh.facets if isinstance(mesh, QuadraticMesh) else mesh.triangles
+        behind = faces_behind(facets.astype(np.int64), self.pairs, n)
+        front = np.arange(n)
+        front[self.pairs[:, 0]] = self.pairs[:, 1]
+        return np.stack([behind, front[behind]], axis=1)
 
     def held_nodes(self) -> dict[str, np.ndarray]:
         """The nodes of each held region."""
@@ -89,11 +113,12 @@ class GivenMesh:
 
 def given_mesh(scene: Scene, nodes: int, kind: str) -> GivenMesh:
     """The mesh of a kind with `nodes` vertices on its outer surface. Raises StudyError where it cannot be made."""
-    if kind == STRAIGHT:
-        return GivenMesh(scene, kind, mesh_for(scene, nodes))
-    made = mesh_at(scene, nodes, 0, 0, True)
-    assert isinstance(made, QuadraticMesh)  # it was asked for
-    return GivenMesh(scene, kind, made)
+    made = mesh_for(scene, nodes) if kind == STRAIGHT else mesh_at(scene, nodes, 0, 0, True)
+    assert isinstance(made, QuadraticMesh) == (kind == CURVED)
+    if scene.cut is None:
+        return GivenMesh(scene, kind, made, int(made.outer_count))
+    after = opened_mesh(made, scene.cut.name)
+    return GivenMesh(scene, kind, after.mesh, int(made.outer_count), after.pairs)
 
 
 def given_meshes(scene: Scene, nodes: int) -> tuple[list[GivenMesh], str]:

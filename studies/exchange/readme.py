@@ -14,7 +14,7 @@ more, each with a description; {version_words}.
 
 | file | content |
 |---|---|
-{meshes}
+{meshes}{cut_files}
 | surface.vtu | the outer surface: triangles, turned outward, with the first nodes of straight.vtu |
 | paths.csv | displacement [m] of every obstacle and held region{lumen_column} over time [s] |
 | scene.json | material, loads, checkpoints, what is judged |
@@ -28,7 +28,7 @@ Point data of the meshes is 1 or 0: {point_data}.
 - **Start.** {start}
 - **Gravity** {gravity} m/s2. **Damping** {damping:g} 1/s: {damping_words}
 {loads}
-- **Lumen.** {lumen}
+- **Lumen.** {lumen}{cut}
 - **Time.** {duration:g} s; positions are judged at {checkpoints} s.
 - **Force.** {force}
 
@@ -72,6 +72,7 @@ def readme(found: Mapping[str, Any], nodes: int, rows: Sequence[Sequence[str]] =
         title=found["title"],
         version_words=f'its layout is "{found["schema"]}" {found["version"]}',
         meshes="\n".join(_mesh_rows(found)),
+        cut_files="".join(f"\n| {row}" for row in _cut_rows(found)),
         lumen_column=", and the factor of the lumen's volume," if found["lumen"] else "",
         point_data=", ".join(f"`{name}`" for name in _point_data(found)),
         mu=found["material"]["shear_modulus"],
@@ -84,6 +85,7 @@ def readme(found: Mapping[str, Any], nodes: int, rows: Sequence[Sequence[str]] =
         damping_words=found["damping"]["words"],
         loads="\n".join(_loads(found)),
         lumen=found["lumen"]["words"] if found["lumen"] else "None: the organ is solid.",
+        cut=f"\n- **Cut.** {found['cut']['words']}" if found["cut"] else "",
         duration=found["duration"],
         checkpoints=", ".join(f"{t:g}" for t in found["checkpoints"]),
         force=found["force"]["words"],
@@ -108,6 +110,11 @@ def _mesh_rows(found: Mapping[str, Any]) -> list[str]:
     ]
     why = found["why_no_curved_mesh"]
     return [*rows, f"| (no curved mesh) | {why} |"] if why else rows
+
+
+def _cut_rows(found: Mapping[str, Any]) -> list[str]:
+    files = {kind: found["cut"]["files"][kind] for kind in found["meshes"]} if found["cut"] else {}
+    return [f"{file} | pairs of facets of the cut, by nodes of {kind}.vtu |" for kind, file in files.items()]
 
 
 def _point_data(found: Mapping[str, Any]) -> list[str]:

@@ -1,6 +1,7 @@
 """A scene in closed words: what its numbers mean, for somebody who has never run this program."""
 
 from massspring import Capsule, Obstacle, Plane, Ramp, Sphere, Trajectory
+from studies.scene.cut import Cut
 from studies.scene.scene import Lumen, Scene
 
 MATERIAL = (
@@ -65,6 +66,20 @@ def lumen_words(lumen: Lumen | None) -> str:
     if set(lumen.filling.values) == {1.0}:
         return "The lumen is closed and full of an incompressible fluid without weight: its volume does not change."
     return f"The lumen is closed; its volume is its volume at rest times {ramped(lumen.filling)}, linear in between."
+
+
+def cut_words(cut: Cut) -> str:
+    """A cut that is there from the start."""
+    faces = "touch without friction where the cut closes" if cut.contact else "pass through each other"
+    return (
+        "The meshes are cut from the start: nodes on the two faces of the cut are there twice, at one place, and both "
+        "faces belong to the outer surface. A reader "
+        "that joins points at one place shuts the cut again. The tables of faces therefore have a row for each pair of "
+        "facets: the nodes behind the cut, then those in front of it, to where the normal of the plane points; nodes "
+        f"at the front of the cut are single. In our own runs the organ is whole until t = {cut.at:g} s. The tissue "
+        "has no memory, so equilibria after that do not depend on it, and only checkpoints after that are judged: "
+        f"start at rest at t = 0 with the cut mesh. Its faces {faces}."
+    )
 
 
 def force_words(scene: Scene) -> str:

@@ -1,18 +1,40 @@
 """What the repository shows: tables, charts and the summaries on its pages, from results that the present code made."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
+from massspring.sources import source_fingerprint
 from studies.base.atomic import write_whole
 from studies.base.errors import StudyError
 from studies.catalog import Study
 from studies.catalog.population import POPULATION
 from studies.catalog.study import command_line
+from studies.exchange.entry import entry_files
+from studies.exchange.league import FOLDER as LEAGUE
+from studies.exchange.peers.contest import OURS, fingerprints
+from studies.exchange.peers.contest import PEERS as PROGRAMS
+from studies.exchange.peers.main import TABLE as SWEEP_TABLE
+from studies.report.league.page import NAME as PAGE
+from studies.report.league.page import write_league
+from studies.report.published_code import (
+    CURRENT,
+    FILE,
+    STALE,
+    Finding,
+    compared,
+    note,
+    scenes_code,
+    studies_code,
+    study_code,
+)
 from studies.report.results import FIGURES, charts_and_tables, refresh
 from studies.report.sentences import SENTENCES
 from studies.report.summary import SUMMARIES
 from studies.store.ledger import Ledger
 from studies.store.machine import machine_id, machine_of, write_machine
+from studies.store.record import peek
 from studies.store.stamps import is_stamped
 from studies.sweep.frame_times import timed_jobs
 from studies.sweep.standings import standings
@@ -20,19 +42,50 @@ from studies.tools.verify.verification import FOLDER as VERIFY
 
 PUBLISHED = Path("results") / "published"
 """Below the folder of README.md; the only part of results/ that git keeps."""
+PEERS, SWEEP = "peers", f"{LEAGUE}/{SWEEP_TABLE}"
+FUZZ = "studies.tools.fuzz"
+ADAPTERS = tuple(sorted({peer.module for peer in (*PROGRAMS, *OURS) if peer.module}))
+
+
+@dataclass(frozen=True)
+class Extra:
+    """Results that belong to no study."""
+
+    command: str
+    """That makes them."""
+    makers: tuple[str, ...]
+    """Modules that do."""
+
+
 EXTRAS = {
-    VERIFY: "organbench verify",
-    FIGURES: "organbench report --figures",
-    "bench.csv": "make bench",
-    "breaking": "make fuzz",
-    "breaking_reference": "make fuzz",
-    "breaking_cuts": "make fuzz",
-    "geometry.csv": "python -m studies.bench.meshes",
+    VERIFY: Extra("organbench verify", ("studies.tools.verify.verification",)),
+    FIGURES: Extra(
+        "organbench report --figures",
+        (
+            *(f"studies.plots.figures.{name}" for name in ("organs", "organ_springs", "paper_ball", "paper_slide")),
+            "studies.runs.paper",
+        ),
+    ),
+    "bench.csv": Extra("make bench", ("studies.bench.main",)),
+    "breaking": Extra(
+        "make fuzz",
+        (*(f"{FUZZ}.{name}" for name in ("campaign", "outcome", "trial")), "studies.plots.campaigns.breaking"),
+    ),
+    "breaking_reference": Extra(
+        "make fuzz", tuple(f"{FUZZ}.reference.{name}" for name in ("outcome", "table", "trial"))
+    ),
+    "breaking_cuts": Extra("make fuzz", (f"{FUZZ}.campaign", f"{FUZZ}.cuts")),
+    "geometry.csv": Extra("python -m studies.bench.meshes", ("studies.bench.meshes",)),
+    "silicone": Extra("python -m studies.tools.silicone.main", ("studies.tools.silicone.main",)),
+    LEAGUE: Extra("make study-league", ("studies.exchange.peers.main", "studies.report.league.page", *ADAPTERS)),
+    SWEEP: Extra("python -m studies.exchange.peers.main --sweep", ("studies.exchange.peers.main", *ADAPTERS)),
 }
-"""Results that belong to no study, and the command that makes each. What was not made again stays as published."""
-APART = (POPULATION, "peers")
+"""What was not made again stays as published."""
+APART = (POPULATION, PEERS)
 """Studies outside of the catalogue: published when they are asked for, and kept meanwhile."""
-SUFFIXES = (".csv", ".md", ".png", ".json")
+REFERENCES, KEPT = "reference", "kept_volume.csv"
+"""Made of all studies of the catalogue."""
+SUFFIXES = (".csv", ".html", ".md", ".png", ".json")
 
 
 def publish(root: Path, studies: Sequence[Study], home: Path) -> tuple[list[Path], list[str]]:
@@ -45,51 +98,147 @@ def publish(root: Path, studies: Sequence[Study], home: Path) -> tuple[list[Path
     """
     ledger = Ledger(root)
     check_studies(ledger, studies)
-    absent = [name for name in EXTRAS if not (root / name).exists()]
-    check_extras(root, [name for name in EXTRAS if name not in absent])
+    absent = [name for name in EXTRAS if not is_made(root, name)]
+    made = [name for name in EXTRAS if name not in absent]
+    check_extras(root, made)
     written, remarks = charts_and_tables(ledger, studies)
     if remarks:
         raise StudyError(f"not published, something is missing: {remarks[0]}")
     sources = [*written, root / "machine.json"]
-    sources += [file for name in EXTRAS for file in _files(root / name)]
+    sources += [file for name in made for file in files_of(root, name)]
     show_summaries(root, studies, home)
     target = home / PUBLISHED
     copies = _copy(sources, root, target)
     kept = {*absent, *APART} - {study.name for study in studies}
-    _remove([file for file in _files(target) if file.relative_to(target).parts[0] not in kept], copies)
+    _remove([file for file in _files(target) if not kept & _names(file, target)], copies)
+    copies.append(note(target, {name: code() for name, code in _codes(studies, made).items()}))
     show_sentences(studies, home)
     return copies, absent
 
 
-def publish_some(root: Path, studies: Sequence[Study], home: Path) -> list[Path]:
-    """The same for the tables, charts and summaries of some studies; all else stays as published. Where that was
-    measured on another machine, the folder of a study gets a machine.json of its own.
+def publish_some(root: Path, studies: Sequence[Study], home: Path, extras: Sequence[str] = ()) -> list[Path]:
+    """The same for the tables, charts and summaries of some studies, and for some of EXTRAS; all else stays as
+    published. Where that was measured on another machine, a folder gets a machine.json of its own.
 
-    Raises StudyError as `publish` does.
+    Raises StudyError as `publish` does, and for one of `extras` that was not made.
     """
     ledger, sources = Ledger(root), []
     check_studies(ledger, studies)
+    for name in extras:
+        if not is_made(root, name):
+            raise StudyError(f"not published: {root / name} is missing; run `{EXTRAS[name].command}` first")
+    check_extras(root, extras)
+    if PEERS in {study.name for study in studies}:
+        check_entries(root, "make study-peers")
     for study in studies:
         written, missing = refresh(ledger, study)
         if missing and not study.counts_losses:
             raise StudyError(f"not published, something is missing: {study.name}: {missing[0]}")
         sources += written
+    sources += [file for name in extras for file in files_of(root, name)]
     show_summaries(root, studies, home)
     target = home / PUBLISHED
     copies = _copy(sources, root, target)
+    names = [study.name for study in studies] + [name for name in extras if (root / name).is_dir()]
     if machine_of(target) not in (None, machine_id()):
-        for study in studies:
-            write_machine(target / study.name / "machine.json")
-            copies.append(target / study.name / "machine.json")
-    _remove([file for study in studies for file in _files(target / study.name)], copies)
+        for name in names:
+            write_machine(target / name / "machine.json")
+            copies.append(target / name / "machine.json")
+    kept = set(EXTRAS) - set(extras)
+    old = [file for name in names for file in _files(target / name) if not kept & _names(file, target)]
+    _remove(old, copies)
+    copies.append(note(target, {name: code() for name, code in _codes(studies, extras, whole=False).items()}))
     show_sentences(studies, home)
     return copies
 
 
+def is_made(root: Path, name: str) -> bool:
+    """Whether there is one of EXTRAS below the results folder `root`."""
+    return bool(entry_files(root / LEAGUE)) if name == LEAGUE else (root / name).exists()
+
+
+def files_of(root: Path, name: str) -> list[Path]:
+    """What is published of one of EXTRAS; table, chart and page of the league are written first."""
+    if name != LEAGUE:
+        return _files(root / name)
+    written, unread = write_league(root)
+    if unread:
+        raise StudyError(f"not published: {unread[0]}")
+    return written
+
+
+def _names(file: Path, target: Path) -> set[str]:
+    """The names in EXTRAS, or of studies, by which a published file may go: of its folder, and its own."""
+    relative = file.relative_to(target)
+    return {relative.parts[0], relative.as_posix()}
+
+
+def _codes(studies: Sequence[Study], extras: Sequence[str], whole: bool = True) -> dict[str, Callable[[], str]]:
+    """Name of what is published -> the hash of the present code for it (studies.report.published_code); whole: also
+    that of the tables over all `studies`."""
+    codes: dict[str, Callable[[], str]] = {study.name: partial(study_code, study) for study in studies}
+    alone = [summary for summary in SUMMARIES if "/" not in summary.file]  # others lie in the folder of a study
+    codes |= {summary.file: codes[summary.study] for summary in alone if summary.study in codes}
+    codes |= {name: partial(source_fingerprint, *EXTRAS[name].makers) for name in extras}
+    if whole:
+        codes[REFERENCES] = partial(scenes_code, studies, "studies.report.references")
+        codes[KEPT] = partial(studies_code, studies, "studies.report.kept_volume")
+    return codes
+
+
+def check(home: Path, studies: Sequence[Study]) -> list[Finding]:
+    """Of all that is published below `home`, whether the present code would make the same, and of the blocks of its
+    pages whether they show it. studies: those of the catalogue and those APART.
+
+    Raises StudyError where nothing is published, and for something there that nothing makes.
+    """
+    target = home / PUBLISHED
+    if not target.is_dir():
+        raise StudyError(f"there is no {target}; run the command in the folder of the project")
+    commands = {study.name: command_line("run", [study]) for study in studies}
+    commands |= {one.file: commands[one.study] for one in SUMMARIES if one.study in commands}
+    commands |= {PEERS: "make study-peers"} | {name: extra.command for name, extra in EXTRAS.items()}
+    every = "make publish"
+    catalogue = [study for study in studies if study.name not in APART]
+    makers = _codes(catalogue, list(EXTRAS)) | _codes([s for s in studies if s.name in APART], (), whole=False)
+    known = {name: (code, f"run `{commands.get(name, every)}`") for name, code in makers.items()}
+    odd = [file for file in _files(target) if not _names(file, target) & {*known, FILE, "machine.json"}]
+    if odd:
+        raise StudyError(f"{odd[0]} is published, and nothing makes it; remove it, or add what does to EXTRAS")
+    return [*compared(target, known), *_blocks(home)]
+
+
+def _blocks(home: Path) -> list[Finding]:
+    """Whether the pages show the tables and sentences that are published."""
+    texts = [(one.page, one.marks, (home / PUBLISHED / one.file)) for one in SUMMARIES]
+    wanted = [(page, marks, file.read_text(encoding="utf-8")) for page, marks, file in texts if file.is_file()]
+    wanted += [(one.page, one.marks, one.written(home / PUBLISHED)) for one in SENTENCES]
+    found = []
+    for page, marks, text in wanted:
+        shown = _read(home / page)
+        same = between(shown, marks, text, home / page) == shown
+        words = "" if same else "it does not show what is published; publish again, and leave the block as it is"
+        found.append(Finding(f"{page}, {marks[0]}", CURRENT if same else STALE, words))
+    return found
+
+
+def check_entries(root: Path, command: str) -> None:
+    """Raises StudyError for an entry below `root` that other code judged."""
+    known = fingerprints()
+    old = [path for path in entry_files(root) if peek(path).fingerprint not in known]
+    if old:
+        raise StudyError(
+            f"not published: {old[0]} and {len(old) - 1} more entries were judged by other code; run `{command}`, and "
+            "judge what others handed in again"
+        )
+
+
 def _copy(sources: Sequence[Path], root: Path, target: Path) -> list[Path]:
-    for source in sources:
-        write_whole(target / source.relative_to(root), source.read_bytes())
-    return [target / source.relative_to(root) for source in sources]
+    places = [root / LEAGUE / PAGE if source == root / PAGE else source for source in sources]
+    copies = [target / place.relative_to(root) for place in places]
+    for source, copy in zip(sources, copies, strict=True):
+        write_whole(copy, source.read_bytes())
+    return copies
 
 
 def _remove(files: Sequence[Path], kept: Sequence[Path]) -> None:
@@ -145,11 +294,13 @@ def check_studies(ledger: Ledger, studies: Sequence[Study], done: str = "publish
 
 def check_extras(root: Path, names: Sequence[str]) -> None:
     """Raises StudyError when one of these EXTRAS was made by other code."""
-    stale = [name for name in names if not is_stamped(root, name)]
+    if LEAGUE in names:
+        check_entries(root / LEAGUE, EXTRAS[LEAGUE].command)
+    stale = [name for name in names if name != LEAGUE and not is_stamped(root, name)]
     if stale:
         raise StudyError(
-            f"not published: {root / stale[0]} was made by other code; run `{EXTRAS[stale[0]]}` and publish again, "
-            "or remove it to keep what is published"
+            f"not published: {root / stale[0]} was made by other code; run `{EXTRAS[stale[0]].command}` and publish "
+            "again, or remove it to keep what is published"
         )
 
 

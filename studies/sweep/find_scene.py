@@ -9,7 +9,7 @@ from studies.base.lookup import lookup
 from studies.catalog.of_scene import study_of
 from studies.catalog.study import Study
 from studies.runs.user_code import load_file
-from studies.scene.library import SCENES
+from studies.scene.library import CUT, SCENES
 from studies.scene.scene import Scene
 
 SUFFIX = ".py"
@@ -71,14 +71,14 @@ def _typed(path: str, module: object, name: str, kind: type) -> Any:
 
 
 def find_scene(word: str) -> Scene:
-    """A scene of SCENES by name, or that of FILE.py: SCENE, else the only scene of its STUDY. FILE.py:NAME is the scene
-    of that name.
+    """A scene of the library by name, or that of FILE.py: SCENE, else the only scene of its STUDY. FILE.py:NAME is the
+    scene of that name.
 
     Raises StudyError for an unknown name, a file without a scene, and a file with several where none is named.
     """
     path, name = split_word(word)
     if not path:
-        return lookup(word, {scene.name: scene for scene in SCENES}, "scene")
+        return lookup(word, {scene.name: scene for scene in (*SCENES, *CUT)}, "scene")
     file = read_user_file(path)
     by_name = {scene.name: scene for scene in file.scenes}
     if name:

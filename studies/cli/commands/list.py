@@ -11,11 +11,11 @@ from studies.base.lookup import lookup
 from studies.cli import outline
 from studies.cli.terminal import console
 from studies.geometry.organs import SHAPES
-from studies.scene.library import SCENES
+from studies.scene.library import CUT, SCENES
 
 KINDS: dict[str, Callable[[], Sequence[tuple[str, str]]]] = {
     "studies": outline.studies,
-    "scenes": lambda: [(scene.name, scene.title) for scene in SCENES],
+    "scenes": lambda: [(scene.name, scene.title) for scene in (*SCENES, *CUT)],
     "organs": lambda: [(name, (make.__doc__ or "").strip().split("\n")[0]) for name, make in SHAPES.items()],
     "methods": outline.methods,
     "metrics": outline.metrics,

@@ -12,6 +12,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+from massspring.sources import own_file, source_fingerprint
 from studies.base.errors import StudyError
 from studies.exchange.entry import HALF_STEP, entry_path, outside
 from studies.exchange.export import export
@@ -21,9 +22,10 @@ from studies.exchange.league.frozen import SET
 from studies.exchange.meshes import given_mesh
 from studies.exchange.peers.environment import python_of
 from studies.exchange.peers.scene_folder import CANNOT, MISSING
+from studies.exchange.precut import given_scene
 from studies.runs.case import Case
 from studies.scene.scene import Scene
-from studies.store.record import Record, Status, write_record
+from studies.store.record import Record, Status, read_record, write_record
 
 TIME_LIMIT = 600.0
 """Of a run [s]; then its process is ended."""
@@ -95,21 +97,56 @@ class Attempt:
 
 
 def contest(
-    root: Path, attempts: Sequence[Attempt], folder: Path, limit: float = TIME_LIMIT, environments: Path | None = None
+    root: Path,
+    attempts: Sequence[Attempt],
+    folder: Path,
+    limit: float = TIME_LIMIT,
+    environments: Path | None = None,
+    again: bool = False,
 ) -> Iterator[Record]:
-    """Makes all attempts, in a `folder` for exported scenes and what is handed in, and stores each below `root`.
+    """Makes all attempts, in a `folder` for exported scenes and what is handed in, and stores each below `root`; what
+    is current there is kept, unless `again`.
 
     environments: where those of the programs are kept; default: in the cache below `root`. Raises StudyError where a
     scene cannot be exported or a record cannot be written.
     """
     for attempt in attempts:
+        mesh = given_mesh(given_scene(attempt.scene), attempt.nodes, attempt.peer.mesh)
+        path = entry_path(root, Case(mesh.scene, mesh.recipe, outside(attempt.name)))
+        stored = None if again else current(path, attempt, mesh.digest)
+        if stored is not None:
+            yield stored
+            continue
         given = folder / f"{attempt.scene.name}-{attempt.nodes}"
         if not given.exists():
             export(attempt.scene, given, attempt.nodes)
         record = judged(attempt, given, limit, environments or root / "cache" / "environments")
-        recipe = given_mesh(attempt.scene, attempt.nodes, attempt.peer.mesh).recipe
-        write_record(entry_path(root, Case(attempt.scene, recipe, outside(attempt.name))), record)
+        write_record(path, record)
         yield record
+
+
+def fingerprint_of(peer: Peer) -> str:
+    """Hash of the code that gives a scene away, runs a program on it and judges what comes back."""
+    own = [peer.module] if peer.module and own_file(peer.module) is not None else []
+    return source_fingerprint("studies.exchange.export", "studies.exchange.judge", "studies.exchange.peers.run", *own)
+
+
+def fingerprints() -> set[str]:
+    """Those that entries of the present code have: of the programs here, and of what others hand in."""
+    return {source_fingerprint("studies.exchange.judge"), *map(fingerprint_of, (*PEERS, *OURS))}
+
+
+def current(path: Path, attempt: Attempt, digest: str) -> Record | None:
+    """The stored record of an attempt, where the present code and settings made it on this mesh; None for one that was
+    skipped, for what it lacked may be there now."""
+    if not path.is_file():
+        return None
+    record = read_record(path)
+    entry = json.loads(str(record.attributes.get(LEAGUE) or "{}"))
+    made = entry.get("set"), entry.get("version"), entry.get("mesh_sha256"), entry.get("settings")
+    same = made == (SET, attempt.peer.version, digest, dict(attempt.peer.settings))
+    fresh = record.fingerprint == fingerprint_of(attempt.peer) and record.status != Status.SKIPPED
+    return record if same and fresh else None
 
 
 def judged(attempt: Attempt, given: Path, limit: float, environments: Path) -> Record:
@@ -121,11 +158,13 @@ def judged(attempt: Attempt, given: Path, limit: float, environments: Path) -> R
     if status == Status.OK:
         try:
             write_entry_file(out.with_suffix(".entry.json"), entry)
-            return judged_file(attempt.scene, entry, out.parent)
+            return replace(judged_file(attempt.scene, entry, out.parent), fingerprint=fingerprint_of(attempt.peer))
         except StudyError as problem:
             status, message = Status.FAILED, str(problem)
-    record = unfinished_record(Case(attempt.scene, mesh.recipe, outside(attempt.name)), status, message)
-    return replace(record, attributes=record.attributes | {LEAGUE: entry.model_dump_json()})
+    case = Case(given_scene(attempt.scene), mesh.recipe, outside(attempt.name))
+    record = unfinished_record(case, status, message)
+    attributes = record.attributes | {LEAGUE: entry.model_dump_json()}
+    return replace(record, attributes=attributes, fingerprint=fingerprint_of(attempt.peer))
 
 
 def entry_of(attempt: Attempt, out: Path, digest: str) -> EntryFile:

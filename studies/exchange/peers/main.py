@@ -19,6 +19,7 @@ from studies.exchange.peers.contest import OURS, PEERS, TIME_LIMIT, Attempt, con
 from studies.exchange.peers.study import NODES, SCENES
 from studies.exchange.peers.sweep import swept
 from studies.scene.library import SCENES as LIBRARY
+from studies.store.stamps import set_stamp
 
 TABLE = "sweep.csv"
 
@@ -32,9 +33,13 @@ def main(
     ] = False,
     sweep: Annotated[bool, typer.Option("--sweep", help="several settings of each on one scene, as a table")] = False,
     nodes: Annotated[int | None, typer.Option(help="vertices on the outer surface; default: 150, then 300")] = None,
+    again: Annotated[bool, typer.Option("--again", help="also what is current")] = False,
     environments: Annotated[Path | None, typer.Option(help="folder of the programs' environments")] = None,
 ) -> None:
-    """Exports the scenes, runs the programs, judges and stores what they hand in as entries."""
+    """Exports the scenes, runs the programs, judges and stores what they hand in as entries.
+
+    Entries of the present code are kept, so that the same command goes on after an interruption.
+    """
     peers = (*PEERS, *(OURS if league else ()))
     if only:
         lookup(only, [peer.name for peer in peers], "program (--only)")
@@ -50,6 +55,8 @@ def main(
                     rows.append(row)
                     pd.DataFrame(rows).to_csv(table, index=False, float_format="%.6g")
                     print(row, flush=True)
+            if not only:
+                set_stamp(results, f"{FOLDER}/{TABLE}")
             return
         scenes = [scene for scene in LIBRARY if scene.name in frozen()] if league else SCENES
         attempts = [
@@ -59,7 +66,8 @@ def main(
             for count in (NODES if nodes is None else (nodes,))
             for shorter in ((1.0, 0.5) if count == NODES[0] and not peer.absent and not league else (1.0,))
         ]
-        for record in contest(results / FOLDER if league else results, attempts, Path(folder), limit, homes):
+        root = results / FOLDER if league else results
+        for record in contest(root, attempts, Path(folder), limit, homes, again):
             print(f"{record.name}: {record.status}" + (f", {record.message}" if record.message else ""), flush=True)
 
 

@@ -13,7 +13,7 @@ from studies.exchange.peers.scene_folder import SceneFolder, hand_in
 from studies.runs.case import Case
 from studies.runs.prepare import prepare
 from studies.runs.run import checkpoint_frames
-from studies.scene.library import SCENES
+from studies.scene.library import CUT, SCENES
 
 
 def run(
@@ -23,7 +23,7 @@ def run(
 
     dt: length of steps and frames [s]; default: the usual share of the stability limit.
     """
-    known = lookup(scene.data["name"], {one.name: one for one in SCENES}, "scene")
+    known = lookup(scene.data["name"], {one.name: one for one in (*SCENES, *CUT)}, "scene")
     known = replace(known, checkpoints=tuple(float(t) for t in scene.times[1:]))
     kind = lookup(method, {one.name: one for one in METHODS}, "method")(**settings)
     recipe = given_mesh(known, int(scene.data["meshes"]["straight"]["outer_nodes"]), scene.mesh).recipe
@@ -34,6 +34,9 @@ def run(
         case = replace(case, dt_fraction=case.dt_fraction * shorter)
     else:
         case = replace(case, dt=dt * shorter, frames=round(known.duration / (dt * shorter)))
+    if known.cut is not None:  # our bodies are cut in a run: after its first frame
+        first = known.duration / (case.frames or known.frames)
+        case = case.replaced(scene=replace(known, cuts=(replace(known.cut, at=first),)))
     prepared = prepare(case)
     simulate(prepared.setup, time_limit=0.0)  # compiles, and ends after a frame
     at = checkpoint_frames(case, prepared)
@@ -43,7 +46,7 @@ def run(
     if history.outcome != "finished":
         raise RuntimeError(history.message)
     force = known.output_force(history.contact_force, history.held_force)
-    positions = np.concatenate([prepared.setup.body.rest[None], history.snapshots])
+    positions = np.concatenate([prepared.body.rest[None], history.snapshots])
     forces = np.concatenate([[0.0], force[[frame - 1 for frame in at]]])
     clock = prepared.setup.clock
     count = None if "implicit_elements" in method else clock.steps * clock.frames  # passes of a step are not counted

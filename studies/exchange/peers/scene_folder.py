@@ -93,11 +93,14 @@ class SceneFolder:
         return int(self.data["force"]["number"])
 
     def check_simple(self, moving_holds: bool = False) -> None:
-        """Raises CannotDo for a lumen, a start in motion and, unless `moving_holds`, held regions that move."""
+        """Raises CannotDo for a lumen, a start in motion, a cut whose faces touch and, unless `moving_holds`, held
+        regions that move."""
         if self.data["lumen"] is not None:
             raise CannotDo("its adapter knows solid organs, not a wall round a lumen")
         if self.data["start"]["speed"] is not None:
             raise CannotDo("its adapter starts at rest")
+        if self.data["cut"] is not None and self.data["cut"]["contact"]:
+            raise CannotDo("its adapter lets the faces of a cut pass through each other")
         if not moving_holds and any(np.any(held["path"]["displacements"]) for held in self.data["held"]):
             raise CannotDo("its adapter knows held regions that do not move")
 

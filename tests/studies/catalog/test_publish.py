@@ -13,7 +13,8 @@ from studies.cli.commands import publish as command
 from studies.cli.commands import report as report_command
 from studies.metrics.timing.cases import timing_file
 from studies.report import publish as publishing
-from studies.report.publish import EXTRAS, PUBLISHED, between, publish, publish_some
+from studies.report.publish import EXTRAS, PUBLISHED, between, check, publish, publish_some
+from studies.report.published_code import CURRENT, FILE, STALE, UNKNOWN, noted, study_code
 from studies.report.sentences import Sentences
 from studies.report.summary import SUMMARIES
 from studies.runs import current as runs
@@ -56,10 +57,9 @@ def test_tables_charts_and_the_summary_are_copied(current, home):
     copies, absent = publish(current, [HEADLINE], home)
     names = {copy.relative_to(home / PUBLISHED).as_posix() for copy in copies}
     wanted = {"volume_loss/one.png", "volume_loss/volume_loss.csv", "summary.md", "kept_volume.csv", "machine.json"}
-    assert names == wanted and absent == list(EXTRAS)
-    assert {copy.read_bytes() == (current / copy.relative_to(home / PUBLISHED)).read_bytes() for copy in copies} == {
-        True
-    }
+    assert names == {*wanted, FILE} and absent == list(EXTRAS)
+    for name in wanted:
+        assert (home / PUBLISHED / name).read_bytes() == (current / name).read_bytes()
     text = (home / PAGE).read_text()
     assert (current / "summary.md").read_text() in text and "old" not in text
     assert not list((home / PUBLISHED).rglob("*.h5"))
@@ -205,6 +205,7 @@ def test_some_studies_are_published_and_all_else_stays(current, home, organbench
         "summary.md",
         "volume_loss/one.png",
         "volume_loss/volume_loss.csv",
+        FILE,
     }
     assert organbench("publish", "volume_los", "--results", current)[0] == 2
 
@@ -230,3 +231,70 @@ def test_the_pages_of_the_project_have_the_marks(summary):
     text = (REPOSITORY / summary.page).read_text(encoding="utf-8")
     begin, end = summary.marks
     assert text.index(begin) < text.index(end)
+
+
+def status_of(home, *studies):
+    return {one.name: one.status for one in check(home, studies)}
+
+
+def test_what_is_published_is_current_until_the_code_that_makes_it_changes(current, home, monkeypatch):
+    bench = current / "bench.csv"
+    bench.write_text("new")
+    set_stamp(current, "bench.csv")
+    publish(current, [HEADLINE], home)
+    block = f"{PAGE}, {BEGIN}"
+    names = ["volume_loss", "summary.md", "bench.csv", "kept_volume.csv", block]
+    assert status_of(home, HEADLINE) == dict.fromkeys(names, CURRENT)
+    # Another case, another table.
+    other = replace(HEADLINE, cases=HEADLINE.cases[:-1])
+    assert status_of(home, other) == dict.fromkeys(names, STALE) | {"bench.csv": CURRENT, block: CURRENT}
+    # Other code of one maker.
+    monkeypatch.setitem(EXTRAS, "bench.csv", replace(EXTRAS["bench.csv"], makers=("studies.bench.meshes",)))
+    assert status_of(home, HEADLINE) == dict.fromkeys(names, CURRENT) | {"bench.csv": STALE}
+    # A page that somebody wrote into.
+    (home / PAGE).write_text((home / PAGE).read_text().replace(f"{BEGIN}\n", f"{BEGIN}\nby hand\n"))
+    assert status_of(home, HEADLINE)[block] == STALE
+    # What was published before codes were noted.
+    (home / PUBLISHED / FILE).unlink()
+    assert status_of(home, HEADLINE)["volume_loss"] == UNKNOWN
+
+
+def test_other_code_of_a_run_makes_a_study_stale(current, home, monkeypatch):
+    publish_some(current, [HEADLINE], home)
+    assert noted(home / PUBLISHED)["volume_loss"] == study_code(HEADLINE)
+    monkeypatch.setattr(runs, "run_fingerprint", lambda: "another code")
+    assert status_of(home, HEADLINE)["volume_loss"] == STALE
+
+
+def test_the_command_says_what_is_behind_with_exit_code_1(current, home, organbench, monkeypatch):
+    monkeypatch.chdir(home)
+    monkeypatch.setattr(command, "STUDIES", (HEADLINE,))
+    publish_some(current, [HEADLINE], home)
+    code, out, _ = organbench("publish", "--check")
+    assert code == 0 and "volume_loss: current" in out and "3 of 3 are current" in out
+    (home / PUBLISHED / FILE).write_text("{}")
+    code, out, _ = organbench("publish", "volume_loss", "--check")
+    assert code == 1 and "volume_loss: unknown, published before its code was noted; run `organbench run" in out
+    assert "0 of 1 are current" in out
+
+
+def test_a_published_file_that_nothing_makes_is_named(home, refused, monkeypatch):
+    monkeypatch.chdir(home)
+    assert "there is no results/published; run the command" in refused("publish", "--check")
+    (home / PUBLISHED / "mine").mkdir(parents=True)
+    (home / PUBLISHED / "mine" / "mine.csv").write_text("1")
+    assert "mine/mine.csv is published, and nothing makes it" in refused("publish", "--check")
+
+
+def test_extras_are_published_by_name(current, home, organbench, refused, monkeypatch):
+    monkeypatch.chdir(home)
+    words = ("publish", "silicone", "--results", current)
+    assert f"{current / 'silicone'} is missing; run `python -m studies.tools.silicone.main` first" in refused(*words)
+    (current / "silicone").mkdir()
+    (current / "silicone" / "silicone.csv").write_text("new")
+    assert "silicone was made by other code" in refused(*words)
+    set_stamp(current, "silicone")
+    (home / PUBLISHED / "silicone").mkdir(parents=True)
+    (home / PUBLISHED / "silicone" / "older.png").write_text("old")
+    assert organbench(*words)[0] == 0
+    assert [file.name for file in (home / PUBLISHED / "silicone").iterdir()] == ["silicone.csv"]

@@ -94,6 +94,7 @@ def test_a_budget_without_a_time_is_not_met(organbench, tmp_path):
         (("liver_press", "--budget", "1"), "budget '1' is not a time"),
         (("liver_press",), "no results of the study 'accuracy'"),
         (("ball_ringing",), "no results apply to scene 'ball_ringing'"),
+        (("ball_incised",), "no results apply to scene 'ball_incised', which cuts its organ"),
         (("nothing.py",), "there is no file nothing.py"),
     ],
 )

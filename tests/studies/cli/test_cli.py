@@ -19,7 +19,7 @@ from studies.metrics.metrics import METRICS
 from studies.metrics.table import study_table
 from studies.reference.reference_solves import reference_solves
 from studies.runs.current import case_path
-from studies.scene.library import SCENES
+from studies.scene.library import CUT, SCENES
 from studies.store.paths import index_path
 from studies.store.record import Field, read_record, write_record
 from studies.sweep.load import load_runs
@@ -33,7 +33,7 @@ def test_list_names_everything():
     result = CliRunner().invoke(cli.app, ["list"], env={"COLUMNS": "200"})
     assert result.exit_code == 0
     named = result.stdout.split()
-    for entry in (*STUDIES, *SCENES, *METHODS, *METRICS):
+    for entry in (*STUDIES, *SCENES, *CUT, *METHODS, *METRICS):
         assert entry.name in named
     assert set(SHAPES) <= set(named)
 

@@ -11,7 +11,7 @@ from studies.catalog import STUDIES
 from studies.catalog.population import POPULATION
 from studies.cli.loading import COMMANDS, NAMES
 from studies.geometry.organs import SHAPES
-from studies.scene.library import SCENES
+from studies.scene.library import CUT, SCENES
 
 ROOT = Path(__file__).parents[3]
 PROGRAM = """
@@ -60,7 +60,7 @@ def test_what_is_offered(words, offered):
 
 def test_every_name_is_offered():
     assert NAMES["studies"]() == [*(study.name for study in STUDIES), POPULATION]
-    assert NAMES["scenes"]() == [scene.name for scene in SCENES]
+    assert NAMES["scenes"]() == [scene.name for scene in (*SCENES, *CUT)]
     assert NAMES["organs"]() == list(SHAPES)
     assert {entry.names for entry in COMMANDS.values()} == {*NAMES, ""}
 

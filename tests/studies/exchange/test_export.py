@@ -17,7 +17,7 @@ from studies.exchange.description import description, judged_metrics
 from studies.exchange.export import DIGITS, paths_table, rounded
 from studies.exchange.words import obstacle_words
 from studies.runs.recipe_text import body_words
-from studies.scene.library import SCENES
+from studies.scene.library import CUT, SCENES
 from studies.scene.library.ball_clamped import BALL_CLAMPED, CAP, PUSH, RADIUS
 from studies.scene.library.ball_squeeze import BALL_SQUEEZE
 from studies.tools.advise import campaign
@@ -111,7 +111,7 @@ def test_material_times_and_what_is_judged_are_said(exported):
         assert said in page
 
 
-@pytest.mark.parametrize("scene", SCENES, ids=lambda scene: scene.name)
+@pytest.mark.parametrize("scene", [*SCENES, *CUT], ids=lambda scene: scene.name)
 def test_numbers_are_as_people_write_them(scene):
     text = json.dumps(rounded(description(scene, [], ""))) + paths_table(scene).to_csv(float_format=f"%.{DIGITS}g")
     numbers = re.findall(r"-?\d+\.?\d*(?:e-?\d+)?", text)
@@ -137,7 +137,7 @@ def test_the_page_holds_what_our_own_bodies_reach(exported, tmp_path, organbench
     assert "No measured body of ours was at hand" in (tmp_path / "out" / "README.md").read_text()
 
 
-@pytest.mark.parametrize("scene", SCENES, ids=lambda scene: scene.name)
+@pytest.mark.parametrize("scene", [*SCENES, *CUT], ids=lambda scene: scene.name)
 def test_every_scene_has_words_for_all_that_happens(scene):
     found = description(scene, [], "")
     assert json.loads(json.dumps(found)) == json.loads(json.dumps(found)) and found["force"]["words"]

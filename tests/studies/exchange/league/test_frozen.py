@@ -1,6 +1,7 @@
 """The frozen set: what it tells is true here, and what it holds back cannot be guessed or entered."""
 
 import json
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -8,7 +9,7 @@ import pytest
 
 from studies.base.errors import StudyError
 from studies.catalog.population.draw import member
-from studies.exchange.league.frozen import frozen
+from studies.exchange.league.frozen import FILE, frozen
 from studies.exchange.meshes import given_mesh
 from studies.reference.published import physics, published
 from studies.scene.library import BALL_SQUEEZE, SCENES
@@ -21,6 +22,26 @@ HELD = {name: one for name, one in frozen().items() if one.held_back}
 def test_five_scenes_are_open_and_three_held_back():
     assert len(OPEN) == 5 and len(HELD) == 3
     assert set(OPEN) <= {scene.name for scene in SCENES} and not set(HELD) & {scene.name for scene in SCENES}
+
+
+@pytest.mark.parametrize("name", frozen())
+def test_every_scene_has_the_hashes_of_its_reference_and_its_meshes(name):
+    one = frozen()[name]
+    assert {key.split("-")[0] for key in one.meshes} == {"straight", "curved"}
+    for digest in (one.reference, one.physics, *one.meshes.values()):
+        assert re.fullmatch("[0-9a-f]{64}", digest)
+    assert len(set(one.meshes.values())) == len(one.meshes)
+
+
+def test_no_two_scenes_share_a_reference_or_physics():
+    for kind in ("reference", "physics"):
+        assert len({getattr(one, kind) for one in frozen().values()}) == len(frozen())
+
+
+def test_what_is_held_back_is_not_in_the_set():
+    """Hashes alone: neither a seed nor a load."""
+    data = json.loads(FILE.read_text())
+    assert all(set(one) == {"reference", "physics", "meshes"} for one in data["held back"].values())
 
 
 @pytest.mark.parametrize("scene", [one for one in SCENES if one.name in OPEN], ids=lambda one: one.name)

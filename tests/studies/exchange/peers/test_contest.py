@@ -12,7 +12,8 @@ from studies.exchange.description import obstacle_entry
 from studies.exchange.entry import HALF_STEP, entries_beside, outside
 from studies.exchange.export import export
 from studies.exchange.judge import unfinished_record
-from studies.exchange.peers.contest import OURS, PEERS, Attempt, Peer, contest
+from studies.exchange.peers import contest as peers
+from studies.exchange.peers.contest import OURS, PEERS, Attempt, Peer, contest, fingerprint_of, fingerprints
 from studies.exchange.peers.scene_folder import CannotDo, SceneFolder, gap, moved, turn_to
 from studies.metrics.run import Run
 from studies.metrics.table import study_table
@@ -205,3 +206,24 @@ def test_an_environment_that_cannot_be_made_is_a_reason(tmp_path, mesh_cache):
     (record,) = contest(tmp_path / "r", [attempt], tmp_path / "g", environments=tmp_path / "e")
     assert record.status == Status.SKIPPED
     assert record.message.startswith("nowhere: pip cannot install ./not-a-folder-of-any-package (")
+
+
+def test_what_is_current_is_kept_and_what_was_skipped_is_tried_again(ended, monkeypatch):
+    root, records = ended
+    asked = []
+    monkeypatch.setattr(peers, "hand_over", lambda attempt, *_: asked.append(attempt.name) or (Status.SKIPPED, "later"))
+    attempts = [Attempt(dummy(name), SCENE, NODES) for name in ("squeezed", "crashed", "unable")]
+    kept, crashed, skipped = contest(root, attempts, root / "given")
+    assert asked == ["unable"] and skipped.message == "later"
+    assert (kept.status, crashed.message) == (Status.OK, records["crashed"].message)
+    # Other settings, and other code of the adapter, run again.
+    other = replace(dummy("squeezed"), settings={"step": 1})
+    assert next(contest(root, [Attempt(other, SCENE, NODES)], root / "given")).message == "later"
+    monkeypatch.setattr(peers, "fingerprint_of", lambda peer: "other code")
+    next(contest(root, [Attempt(dummy("crashed"), SCENE, NODES)], root / "given"))
+    assert asked == ["unable", "squeezed", "crashed"]
+
+
+def test_entries_of_the_present_code_are_known_by_their_fingerprint(ended):
+    assert fingerprint_of(PEERS[0]) in fingerprints() and len(fingerprints()) > len(OURS)
+    assert ended[1]["squeezed"].fingerprint == fingerprint_of(dummy("squeezed"))

@@ -1,0 +1,42 @@
+"""A scene that cuts its organ, for programs that cannot: its mesh is cut from the start, and only what comes after the
+cut is judged.
+
+The tissue has no memory, so an equilibrium after the cut does not depend on when it was made.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from studies.base.errors import StudyError
+from studies.reference.load import Reference
+from studies.scene.scene import Scene
+from studies.store.schema import REFERENCE_FIELDS
+
+
+def given_scene(scene: Scene) -> Scene:
+    """The scene as another program gets it: of one with a cut, the checkpoints after it alone.
+
+    Raises StudyError for a cut whose time matters: one in a scene without equilibria, or one that lets a piece go.
+    """
+    cut = scene.cut
+    if cut is None:
+        return scene
+    if cut.free or scene.start is not None:
+        what = f"cut '{cut.name}' lets a piece go" if cut.free else "it starts in motion"
+        raise StudyError(f"scene '{scene.name}' cannot be given away cut from the start: {what}, so its time matters")
+    return replace(scene, checkpoints=tuple(t for t in scene.checkpoints if t > cut.at))
+
+
+def reference_of(scene: Scene, reference: Reference | None) -> Reference | None:
+    """The reference of a scene at the checkpoints of the same scene as given_scene has it."""
+    count = len(scene.checkpoints)
+    if reference is None or count == len(reference.scene.checkpoints):
+        return reference
+    fields = dict(reference.record.fields)
+    for name, stored in fields.items():
+        lengths = REFERENCE_FIELDS[name].shape.split()
+        if "K" in lengths:
+            late = np.take(stored.values, range(-count, 0), axis=lengths.index("K"))
+            fields[name] = replace(stored, values=late)
+    return Reference(scene, replace(reference.record, fields=fields))

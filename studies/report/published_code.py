@@ -1,0 +1,94 @@
+"""Which code makes what is published: noted when it is published, and compared with the present code by `organbench
+publish --check`."""
+
+import hashlib
+import json
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from massspring.sources import source_fingerprint
+from studies.base.atomic import write_whole
+from studies.base.errors import StudyError
+from studies.catalog.study import Study
+from studies.metrics.table import metric
+from studies.reference.published import fingerprint_of
+from studies.runs.current import case_fingerprint
+from studies.runs.user_code import file_of
+
+FILE = "code.json"
+"""In the published folder: name -> hash of the code that made it."""
+CURRENT, STALE, UNKNOWN = "current", "stale", "unknown"
+
+
+@dataclass(frozen=True)
+class Finding:
+    """Whether the present code would make the same."""
+
+    name: str
+    """Of a file or folder below the published one, or of a block of a page."""
+    status: str
+    words: str = ""
+    """What to do."""
+
+
+def study_code(study: Study) -> str:
+    """Hash of what the tables and charts of a study are made by and of: its cases, the code that runs, judges, measures
+    and draws them, and their references."""
+    parts = [text for case in study.cases for text in (case.key, case_fingerprint(case))]
+    parts += [fingerprint_of(scene) for scene in study.scenes]
+    drawings = [chart.drawing for chart in study.charts] + [metric(column).of for column in study.columns]
+    parts += [file.sha256 for file in map(file_of, drawings) if file is not None]
+    modules = {drawing.partition(":")[0] for drawing in drawings if isinstance(drawing, str)}
+    parts.append(source_fingerprint("studies.metrics.table", *sorted(modules)))
+    return _digest([*parts, *(metric(column).name for column in study.columns)])
+
+
+def scenes_code(studies: Sequence[Study], module: str) -> str:
+    """The same of a table over the references of all scenes of `studies`, written by `module`."""
+    scenes = {scene.name: scene for study in studies for scene in study.scenes}
+    return _digest([source_fingerprint(module), *map(fingerprint_of, scenes.values())])
+
+
+def studies_code(studies: Sequence[Study], module: str) -> str:
+    """The same of a table over the runs of all `studies`."""
+    return _digest([source_fingerprint(module), *map(study_code, studies)])
+
+
+def _digest(parts: Iterable[str]) -> str:
+    return hashlib.sha256("\0".join(parts).encode()).hexdigest()
+
+
+def noted(published: Path) -> dict[str, str]:
+    """Name -> hash, as noted in the published folder. Raises StudyError for a note that cannot be read."""
+    path = published / FILE
+    if not path.is_file():
+        return {}
+    try:
+        data = json.loads(path.read_text(encoding="utf-8"))
+        return {str(name): str(code) for name, code in data.items()}
+    except (OSError, ValueError, AttributeError) as error:
+        raise StudyError(f"{path} cannot be read ({error}); restore it from git") from error
+
+
+def note(published: Path, made: Mapping[str, str]) -> Path:
+    """Notes by which code these names were made; those that are no longer there are forgotten. Where the note lies."""
+    known = {name: code for name, code in noted(published).items() if (published / name).exists()}
+    text = json.dumps(dict(sorted((known | dict(made)).items())), indent=1) + "\n"
+    write_whole(published / FILE, text.encode())
+    return published / FILE
+
+
+def compared(published: Path, makers: Mapping[str, tuple[Callable[[], str], str]]) -> list[Finding]:
+    """What is published, name by name. makers: the hash of the present code, and the command that makes it again."""
+    known, found = noted(published), []
+    for name, (code, command) in makers.items():
+        if not (published / name).exists():
+            continue
+        if name not in known:
+            found.append(Finding(name, UNKNOWN, f"published before its code was noted; {command}, then publish it"))
+        elif known[name] == code():
+            found.append(Finding(name, CURRENT))
+        else:
+            found.append(Finding(name, STALE, f"other code made it; {command}, then publish it"))
+    return found

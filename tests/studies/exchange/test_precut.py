@@ -1,0 +1,205 @@
+"""A scene with a cut for programs that cannot cut: its meshes are open, its loads the same, and what is at rest then is
+what our own cut body comes to."""
+
+import csv
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import meshio
+import numpy as np
+import pytest
+
+from massspring import Attachment, ImplicitVolume, Material, Setup, Trajectory, make_clock, simulate, step_limit
+from massspring import tetrahedral_body as body_of
+from studies.base.errors import StudyError
+from studies.exchange.entry import entries_beside
+from studies.exchange.export import export
+from studies.exchange.meshes import given_mesh
+from studies.exchange.peers import own
+from studies.exchange.peers.scene_folder import CannotDo, SceneFolder
+from studies.exchange.precut import given_scene, reference_of
+from studies.geometry.mesh.organ_mesh import boundary_triangles, tetrahedron_volumes
+from studies.metrics.metrics import force_end, mean_error, opening_error
+from studies.metrics.run import Run
+from studies.reference.load import reference_for
+from studies.runs.case import BodyRecipe, Case
+from studies.runs.run import measure
+from studies.scene.library import BALL_BISECTED, BALL_CUT_PRESSED, BALL_INCISED, BALL_SQUEEZE
+from studies.scene.library.ball_incised import RADIUS
+from studies.store.record import read_record
+
+pytestmark = pytest.mark.slow
+NODES = 150
+SIZE = 2 * 3**0.5 * RADIUS
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory, mesh_cache):
+    folder = tmp_path_factory.mktemp("precut") / "incised"
+    export(BALL_INCISED, folder, NODES)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def cut_body(mesh_cache) -> Run:
+    """Our own body, cut on the way and left to rest."""
+    case = Case(BALL_INCISED, BodyRecipe(nodes=NODES), ImplicitVolume())
+    run = Run(case, measure(case), reference_for(Path(), BALL_INCISED))
+    assert run.record.status == "ok", run.record.message
+    return run
+
+
+@pytest.fixture(scope="module")
+def outsider(folder):
+    """Steps of a body that is made of nothing but the exported folder; times, positions and the probed force."""
+    found = json.loads((folder / "scene.json").read_text())
+    mesh = meshio.read(folder / "straight.vtu")
+    cells = mesh.cells_dict["tetra"].astype(np.int64)
+    material = Material(found["material"]["shear_modulus"], found["material"]["density"])
+    body = body_of(mesh.points, boundary_triangles(cells), cells, material)
+    held = tuple(
+        Attachment(
+            np.flatnonzero(mesh.point_data[one["point_data"]] == 1),
+            Trajectory(tuple(one["path"]["times"]), tuple(map(tuple, one["path"]["displacements"]))),
+        )
+        for one in found["held"]
+    )
+    damping = found["damping"]["rate"]
+    limit = step_limit(body, damping, np.concatenate([one.nodes for one in held]))
+    clock = make_clock(found["duration"], found["frames"], 0.5 * limit.damped, limit)
+    setup = Setup(body, ImplicitVolume(), clock, attachments=held, damping=damping)
+    at = [round(t / clock.frame) for t in found["checkpoints"]]
+    history = simulate(setup, at)
+    assert history.outcome == "finished", history.message
+    force = history.held_force[[frame - 1 for frame in at], 1, 2]
+    return (
+        np.array([0.0, *found["checkpoints"]]),
+        np.concatenate([body.rest[None], history.snapshots]),
+        np.concatenate([[0.0], force]),
+    )
+
+
+def test_the_exported_mesh_comes_to_the_rest_of_the_body_that_is_cut_on_the_way(cut_body, outsider):
+    _, positions, force = outsider
+    np.testing.assert_allclose(positions[0], cut_body.fields.rest, atol=1e-12)
+    assert np.abs(positions[-1] - cut_body.fields.snapshots[-1]).max() < 1e-6 * SIZE
+    assert force[-1] == pytest.approx(cut_body.force[-1], rel=1e-5)
+    assert np.abs(positions[-1] - positions[0]).max() > 0.05 * SIZE  # it is pulled far
+
+
+def test_a_reader_finds_both_faces_of_the_cut(folder):
+    found = json.loads((folder / "scene.json").read_text())
+    assert found["cut"]["plane"] == {"point": [0, 0, 0], "normal": [0, 0, 1]} and found["cut"]["contact"] is False
+    assert found["cut"]["within"] == {"kind": "halfspace", "point": [0, 0, 0], "normal": [1, 0, 0]}
+    for kind, corners in (("straight", 3), ("curved", 6)):
+        mesh = meshio.read(folder / found["meshes"][kind]["file"])
+        (cells,) = [block.data for block in mesh.cells]
+        with (folder / found["cut"]["files"][kind]).open() as file:
+            rows = np.array([[int(cell) for cell in row.values()] for row in csv.DictReader(file)])
+        behind, front = rows[:, :corners], rows[:, corners:]
+        np.testing.assert_array_equal(mesh.points[behind], mesh.points[front])
+        assert np.abs(mesh.points[rows][:, :, 2]).max() < 1e-12
+        # Half of the equator's disc, up to its straight front, whose nodes alone are single.
+        a, b, c = mesh.points[behind[:, :3]].transpose(1, 0, 2)
+        area = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
+        assert area.sum() == pytest.approx(0.5 * np.pi * RADIUS**2, rel=0.03)
+        single = np.unique(behind[behind == front])
+        assert len(single) >= 5 and np.abs(mesh.points[single, 0]).max() < 1e-5  # m: curved sides
+        # What is behind belongs to elements below the plane, what is in front to those above.
+        for faces, below in ((behind, True), (front, False)):
+            own_nodes = np.setdiff1d(faces, single)
+            touching = cells[np.isin(cells[:, :4], own_nodes).any(axis=1)][:, :4]
+            assert ((mesh.points[touching].mean(axis=1)[:, 2] < 0) == below).all()
+        boundary = {frozenset(face) for face in boundary_triangles(cells[:, :4].astype(np.int64)).tolist()}
+        assert all(frozenset(face[:3]) in boundary for face in (*behind.tolist(), *front.tolist()))
+        # The mesh fills the ball once, as the uncut one would.
+        volume = tetrahedron_volumes(mesh.points, cells[:, :4].astype(np.int64))
+        assert (volume > 0).all() and volume.sum() == pytest.approx(4 / 3 * np.pi * RADIUS**3, rel=0.06)
+
+
+def test_the_page_says_that_the_cut_is_there_from_the_start(folder):
+    page, found = (folder / "README.md").read_text(), json.loads((folder / "scene.json").read_text())
+    assert found["checkpoints"] == [2.0, 4.0] and "positions are judged at 2, 4 s" in page
+    for said in ("cut from the start", "cut_curved.csv", "opening_error", "piece_worst", "until t = 1 s"):
+        assert said in page
+    assert "cut_energy" not in page and "cut_ms" not in page  # of our own event
+
+
+def told_of(out: str) -> dict[str, float]:
+    """The metrics that `judge` prints."""
+    rows = [line.split() for line in out.splitlines() if line.startswith("  ")]
+    return {name: float(value.replace("−", "-")) for name, value, *_ in rows}
+
+
+def test_an_entry_is_judged_by_its_opening_too(organbench, outsider, cut_body, tmp_path):
+    t, positions, force = outsider
+    np.savez(tmp_path / "theirs.npz", t=t, positions=positions, force=force)
+    results = tmp_path / "results"
+    words = ("judge", "--nodes", NODES, "--results", results, "ball_incised")
+    code, out, err = organbench(*words, tmp_path / "theirs.npz")
+    assert code == 0 and not err
+    told = told_of(out)
+    assert {"opening_error", "force_error", "mean_error", "overlap", "piece_worst"} <= set(told)
+    (file,) = (results / "entries").glob("*.h5")
+    (beside,), problems = entries_beside(results, [BALL_INCISED], lambda scene: reference_for(results, scene))
+    assert not problems and beside.record.name == read_record(file).name
+    # The same numbers as of the body that was cut on the way, which the whole reference judges.
+    for metric in (opening_error, mean_error, force_end):
+        assert metric(beside) == pytest.approx(metric(cut_body), rel=1e-3)
+    assert told["opening_error"] == pytest.approx(opening_error(cut_body), rel=0.1)
+    # Shut, it lacks the whole opening.
+    wrong = positions.copy()
+    wrong[:, beside.cut_pairs[:, 1]] = wrong[:, beside.cut_pairs[:, 0]]
+    np.savez(tmp_path / "wrong.npz", t=t, positions=wrong, force=2 * force)
+    code, out, _ = organbench(*words, tmp_path / "wrong.npz")
+    assert told_of(out)["opening_error"] == pytest.approx(100.0, abs=0.5)
+    assert told_of(out)["force_end"] > 80.0
+
+
+def test_a_reader_that_joins_points_is_found_out(refused, outsider, tmp_path, mesh_cache):
+    t, positions, _ = outsider
+    pairs = given_mesh(given_scene(BALL_INCISED), NODES, "straight").pairs
+    kept = np.setdiff1d(np.arange(positions.shape[1]), pairs[:, 1])
+    np.savez(tmp_path / "joined.npz", t=t, positions=positions[:, kept])
+    words = ("judge", "ball_incised", tmp_path / "joined.npz", "--nodes", NODES, "--results", tmp_path / "results")
+    assert "the reader joined those that lie at one place, which shuts the cut" in refused(*words)
+
+
+def test_the_reference_after_the_cut_is_the_end_of_the_whole_one(tmp_path):
+    whole = reference_for(tmp_path, BALL_INCISED)
+    late = reference_of(given_scene(BALL_INCISED), whole)
+    np.testing.assert_array_equal(late.force, whole.force[-2:])
+    np.testing.assert_array_equal(late.field("displacement"), whole.field("displacement")[-2:])
+    assert late.total_uncertainty["opening"] == whole.total_uncertainty["opening"]
+    assert reference_of(BALL_INCISED, whole) is whole and given_scene(BALL_SQUEEZE) is BALL_SQUEEZE
+
+
+def test_pieces_keep_a_volume_each(mesh_cache):
+    for kind in ("straight", "curved"):
+        mesh = given_mesh(given_scene(BALL_BISECTED), NODES, kind)
+        half = 2 / 3 * np.pi * RADIUS**3
+        assert mesh.volumes.names == ("piece 0", "piece 1")
+        assert mesh.volumes.measure(mesh.points) == pytest.approx([half, half], rel=0.07)
+
+
+def test_our_own_adapter_enters_on_the_exported_mesh(folder, cut_body, tmp_path):
+    own.run(SceneFolder(folder), tmp_path / "ours.npz", method="implicit_volume")
+    with np.load(tmp_path / "ours.npz") as handed:
+        np.testing.assert_allclose(handed["positions"][0], meshio.read(folder / "straight.vtu").points, atol=1e-12)
+        assert np.abs(handed["positions"][-1] - cut_body.fields.snapshots[-1]).max() < 1e-6 * SIZE
+
+
+def test_adapters_without_contact_of_faces_say_so(tmp_path, mesh_cache):
+    export(BALL_CUT_PRESSED, tmp_path / "pressed", NODES)
+    page = (tmp_path / "pressed" / "README.md").read_text()
+    assert "touch without friction where the cut closes" in page
+    with pytest.raises(CannotDo, match="lets the faces of a cut pass through each other"):
+        SceneFolder(tmp_path / "pressed").check_simple(moving_holds=True)
+
+
+def test_a_cut_whose_time_matters_is_not_given_away(tmp_path):
+    loose = replace(BALL_BISECTED, held=BALL_BISECTED.held[:1], cuts=(replace(BALL_BISECTED.cut, free=True),))
+    with pytest.raises(StudyError, match="cut 'section' lets a piece go, so its time matters"):
+        export(loose, tmp_path / "loose", NODES)
+    assert not (tmp_path / "loose").exists()
