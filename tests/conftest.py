@@ -78,7 +78,7 @@ def mesh_cache(run_folder: Path) -> Iterator[Path]:
 
 @pytest.fixture(scope="session", autouse=True)
 def copied_processes() -> Iterator[None]:
-    """The mesher and processes of a sweep are copies. Tests of either, and every command in a process, start new ones."""
+    """The mesher and processes of a sweep are copies; tests of either, and a command in a process, start new ones."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(process, "subprocess", copies)
         patch.setattr(processes, "SPAWN", copies.Sweeping)

@@ -72,7 +72,7 @@ class Sweeping:
     Pipe = staticmethod(SPAWN.Pipe)
 
     @staticmethod
-    def Process(**how):  # noqa: N802
+    def Process(**how):
         """A process that is not started."""
         return (Copy if can_be_copied(os.environ) else SPAWN.Process)(**how)
 
@@ -109,7 +109,7 @@ def become(words: list[str], ends: list[Connection]) -> None:
     runpy.run_module(words[0], run_name="__main__", alter_sys=True)
 
 
-def Popen(command: list[str], *, env: Mapping[str, str], stdin: int, stdout: int, stderr, text: bool):  # noqa: N802
+def Popen(command: list[str], *, env: Mapping[str, str], stdin: int, stdout: int, stderr, text: bool):
     """A copy for a command of the mesher, and else a new process."""
     if can_be_copied(env) and command[1] == "-m" and command[2] in MAKERS:
         return Meshing(command[2:], stdin, stderr)
