@@ -18,16 +18,9 @@ from massspring.sources import ROOT
 
 MAKERS = ("studies.geometry.mesher.organ_recipe", "studies.geometry.mesher.scan_recipe")
 """What a mesher's process is asked to run."""
-IMPORTED = (
-    __name__,
-    *MAKERS,
-    "studies.sweep.job",
-    "studies.sweep.local",
-    "studies.runs.run",
-    "studies.reference.solve",
-)
+IMPORTED = (__name__, *MAKERS, "studies.sweep.local", "studies.runs.run", "studies.reference.solve")
 ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
-ANY = ("ORGANBENCH_", "PYTEST_", "PYTHONPATH", "KMP_DUPLICATE_LIB_OK")
+ANY = ("ORGANBENCH_", "PYTEST_", "PYTHONPATH", "KMP_", "PYPARDISO_")
 """Variables beginning so are read when they are needed, or set by a library as it is loaded."""
 BEFORE = dict(os.environ)
 """Variables before the first test."""
