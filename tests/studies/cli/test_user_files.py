@@ -69,7 +69,9 @@ def test_a_scene_alone_is_a_study_of_four_bodies_with_charts(write):
     assert {"force_end", "mean_error", "shape_error", "shape_volume"} <= set(study.columns)
 
 
-@pytest.mark.parametrize("words", [("run", "--dry-run"), ("status",), ("advise",), ("safe-dt", "--nodes", 60)])
+@pytest.mark.parametrize(
+    "words", [("run", "--dry-run"), ("status",), ("advise", "--no-timing"), ("safe-dt", "--nodes", 60)]
+)
 def test_both_kinds_of_file_are_taken(organbench, write, tmp_path, monkeypatch, words):
     monkeypatch.setenv("ORGANBENCH_RESULTS", str(tmp_path / "results"))
     command, *options = words
