@@ -108,6 +108,7 @@ def test_lines_for_a_shell_name_the_file(write):
 def test_do_it_again_is_a_line_that_runs_and_reports_keep_studies_of_files(organbench, write, tmp_path, monkeypatch):
     """The page without the file holds what was drawn with it; its lines name the file, which is not run for it."""
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("studies.cli.commands.report.STUDIES", ())
     write(STUDY)
     assert organbench("run", "mine.py", "--jobs", 1)[0] == 0
     assert organbench("report", "mine.py")[0] == 0
@@ -162,6 +163,7 @@ def test_status_knows_smoke_runs(organbench, write, tmp_path):
 
 def test_a_study_that_the_page_cannot_show_is_named(organbench, write, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("studies.cli.commands.report.STUDIES", ())
     write(STUDY)
     assert organbench("run", "mine.py", "--jobs", 1)[0] == 0
     part = tmp_path / "results" / "cache" / "tiny.page.json"
