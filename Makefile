@@ -1,7 +1,8 @@
 # `make` alone prints this list. Every target does its own set-up (.ci/setup), instant when nothing changed.
 BIN := .venv/bin
 # A file stays with one process: kernels that only it needs are compiled once. tests/conftest.py orders the files.
-PYTEST := $(BIN)/python -m pytest -q -n 2 --dist loadfile --no-loadscope-reorder
+# Two processes fill two cores: threads of the linear algebra would only wait for each other.
+PYTEST := OMP_NUM_THREADS=1 $(BIN)/python -m pytest -q -n 2 --dist loadfile --no-loadscope-reorder
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:

@@ -10,8 +10,11 @@ from pathlib import Path
 import pytest
 from numba.core import event
 
+from studies.base import processes
 from studies.base.compile_watch import EVENT, Compiled, CompileWatch
+from studies.geometry.mesher import process
 from studies.sweep.compiling.log import summary
+from tests import copies
 
 PATIENCE = 900.0
 """Seconds that a process waits for what another one makes; the longest takes a minute on a busy machine."""
@@ -71,6 +74,15 @@ def mesh_cache(run_folder: Path) -> Iterator[Path]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("ORGANBENCH_CACHE", str(folder))
         yield folder
+
+
+@pytest.fixture(scope="session", autouse=True)
+def copied_processes() -> Iterator[None]:
+    """The mesher and processes of a sweep are copies; tests of either, and a command in a process, start new ones."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(process, "subprocess", copies)
+        patch.setattr(processes, "SPAWN", copies.Sweeping)
+        yield
 
 
 @pytest.hookimpl(tryfirst=True)

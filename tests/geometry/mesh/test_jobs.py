@@ -1,6 +1,7 @@
 """Meshes are made in a process of their own, once, and the same every time."""
 
 import logging
+import subprocess
 import sys
 import time
 
@@ -17,8 +18,9 @@ RECIPE = {"kind": "organ", "name": "ball", "organ": "ball", "nodes": 150, "param
 
 @pytest.fixture
 def own_cache(tmp_path, monkeypatch):
-    """A cache of this test's own."""
+    """A cache of this test's own, for meshes that new processes make: all others come from copies of one process."""
     monkeypatch.setenv("ORGANBENCH_CACHE", str(tmp_path / "cache"))
+    monkeypatch.setattr(process, "subprocess", subprocess)
     return tmp_path / "cache"
 
 

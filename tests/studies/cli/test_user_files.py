@@ -69,7 +69,9 @@ def test_a_scene_alone_is_a_study_of_four_bodies_with_charts(write):
     assert {"force_end", "mean_error", "shape_error", "shape_volume"} <= set(study.columns)
 
 
-@pytest.mark.parametrize("words", [("run", "--dry-run"), ("status",), ("advise",), ("safe-dt", "--nodes", 60)])
+@pytest.mark.parametrize(
+    "words", [("run", "--dry-run"), ("status",), ("advise", "--no-timing"), ("safe-dt", "--nodes", 60)]
+)
 def test_both_kinds_of_file_are_taken(organbench, write, tmp_path, monkeypatch, words):
     monkeypatch.setenv("ORGANBENCH_RESULTS", str(tmp_path / "results"))
     command, *options = words
@@ -106,6 +108,7 @@ def test_lines_for_a_shell_name_the_file(write):
 def test_do_it_again_is_a_line_that_runs_and_reports_keep_studies_of_files(organbench, write, tmp_path, monkeypatch):
     """The page without the file holds what was drawn with it; its lines name the file, which is not run for it."""
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("studies.cli.commands.report.STUDIES", ())
     write(STUDY)
     assert organbench("run", "mine.py", "--jobs", 1)[0] == 0
     assert organbench("report", "mine.py")[0] == 0
@@ -160,6 +163,7 @@ def test_status_knows_smoke_runs(organbench, write, tmp_path):
 
 def test_a_study_that_the_page_cannot_show_is_named(organbench, write, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("studies.cli.commands.report.STUDIES", ())
     write(STUDY)
     assert organbench("run", "mine.py", "--jobs", 1)[0] == 0
     part = tmp_path / "results" / "cache" / "tiny.page.json"

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from studies.base.errors import StudyError
+from studies.geometry.mesher.jobs import cached
 from studies.meshing.graded_mesh import outer_nodes
 from studies.meshing.held_mesh import held_mesh
 from studies.meshing.kept_shape import held_area_error
@@ -21,8 +22,18 @@ BODY = BodyRecipe("quadratic", NODES, graded="adaptive", mass="stiffness")
 
 
 @pytest.fixture(scope="module")
-def mesh():
-    return mesh_of(LIVER_PROBE, BODY)
+def solved(mesh_cache):
+    """The mesh, and the error indicator that it comes from."""
+    found = []
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(module, "cached", lambda *asked: found.append(cached(*asked)) or found[0])
+        mesh = mesh_of(LIVER_PROBE, BODY)
+    return mesh, found[0]["indicator"]
+
+
+@pytest.fixture(scope="module")
+def mesh(solved):
+    return solved[0]
 
 
 def test_it_has_the_wanted_nodes_and_stands_upright(mesh):
@@ -60,9 +71,9 @@ def test_the_largest_indicators_are_halved_first():
     assert near.any() and outer_nodes(body, quadratic=True) >= outer_nodes(coarse, quadratic=True) + 3
 
 
-def test_the_indicator_belongs_to_the_elements_of_the_coarse_mesh():
-    organ_mesh, coarse = coarse_mesh(LIVER_PROBE, 300)
-    indicator = indicator_of(LIVER_PROBE, organ_mesh, coarse)
+def test_the_indicator_belongs_to_the_elements_of_the_coarse_mesh(solved):
+    _, coarse = coarse_mesh(LIVER_PROBE, NODES)
+    indicator = solved[1]
     assert indicator.shape == (coarse.mesh.nelements,) and indicator.max() == 1.0 and indicator.min() >= 0.0
     # Half of the error is in few elements, or it would say nothing.
     assert np.sort(indicator)[::-1][: len(indicator) // 5].sum() > 0.5 * indicator.sum()
@@ -74,7 +85,7 @@ def test_a_coarse_mesh_that_loses_what_is_held_is_left_for_a_finer_one(monkeypat
     levels = []
     monkeypatch.setattr(module, "lost_area", lambda _, level: levels.append(level) or lost[level])
     lost[round(1.08 * first)] = 1.0
-    coarse_mesh(LIVER_PROBE, NODES)
+    coarse_mesh(BALL_CLAMPED, NODES)
     assert levels == [first, round(1.08 * first)]
 
 
@@ -95,7 +106,7 @@ def test_a_coarse_body_without_an_equilibrium_is_a_sentence(monkeypatch):
         raise SolveError("no step")
 
     monkeypatch.setattr(module, "equilibrium_path", fails)
-    organ_mesh, coarse = coarse_mesh(LIVER_PROBE, 300)
+    organ_mesh, coarse = coarse_mesh(LIVER_PROBE, NODES)
     with pytest.raises(StudyError, match=r"no solution by which to adapt \(no step\); choose graded=True"):
         indicator_of(LIVER_PROBE, organ_mesh, coarse)
 

@@ -10,8 +10,16 @@ from pathlib import Path
 
 import pytest
 
+from studies.base import processes
 from studies.base.errors import StudyError
 from studies.base.processes import Child, run_each
+from tests.copies import SPAWN
+
+
+@pytest.fixture(autouse=True)
+def new_processes(monkeypatch):
+    """As in a command: elsewhere in the tests they are copies of one."""
+    monkeypatch.setattr(processes, "SPAWN", SPAWN)
 
 
 class Piece:
