@@ -10,6 +10,7 @@ from studies.cli.commands.run import _say_trust
 from studies.metrics.trust import SHARE, Apart, apart, verdicts, within
 from studies.metrics.wish import Wish
 from studies.runs.case import BodyRecipe
+from studies.scene.library.spleen_sag import SPLEEN_SAG
 from studies.store.record import Status
 from tests.studies import made_up_run
 from tests.studies.tiny import tiny_study
@@ -57,6 +58,12 @@ def test_a_verdict_names_both_meshes_and_both_numbers():
     (verdict,) = verdicts([body_run(FINE), body_run(COARSE, force=1.02, shift=0.9), body_run(BodyRecipe("surface"))])
     assert not verdict.trusted and verdict.scene == "ball_clamped"
     assert verdict.why == "two meshes (994 and 1,194 nodes) differ by 2 % in force and 10 % in displacement"
+
+
+def test_an_organ_that_hangs_is_not_trusted_though_two_meshes_agree():
+    runs = [replace(one, case=replace(one.case, scene=SPLEEN_SAG)) for one in (body_run(FINE), body_run(COARSE))]
+    (verdict,) = verdicts(runs)
+    assert not verdict.trusted and "both lack the same at the outline by which it hangs" in verdict.why
 
 
 def test_where_there_is_a_reference_it_judges():
