@@ -112,7 +112,7 @@ def rigid_share(run: Run) -> float:
 
 def trust_of(runs: Sequence[Run]) -> str:
     """How often the comparison of two meshes names a member whose finer body is beyond the target, and doubts one that
-    is within, on the half of the members that set its threshold and on the other."""
+    is within, of members of even and of odd number."""
     found = judgements(runs)
     if not found:
         return NONE
@@ -128,9 +128,9 @@ def trust_of(runs: Sequence[Run]) -> str:
 
 
 def _halves(found: Sequence[Judgement]) -> dict[str, list[Judgement]]:
-    """Judgements by pair of meshes and half: members of even number set the threshold."""
+    """Judgements by pair of meshes and half of the members."""
     halves: dict[str, list[Judgement]] = {}
     for one in found:
-        half = "set the threshold" if int(one.scene.rsplit("_", 1)[1]) % 2 == 0 else "judge it"
-        halves.setdefault(f"{one.nodes[0]:,} and {one.nodes[1]:,} nodes, members that {half}", []).append(one)
-    return dict(sorted(halves.items()))
+        half = "odd" if int(one.scene.rsplit("_", 1)[1]) % 2 else "even"
+        halves.setdefault(f"{one.nodes[0]:,} and {one.nodes[1]:,} nodes, members of {half} number", []).append(one)
+    return halves

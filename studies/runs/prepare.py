@@ -199,9 +199,9 @@ def prepare(case: Case) -> Prepared:
     if reason is not None:
         raise DoesNotApply(f"method '{case.method.name}' does not apply to scene '{scene.name}': {reason}")
     check_masses(scene, case.body)
+    check_opens(scene, case.body)
     if scene.cut is not None:
         check_blade(scene.cut, scene.name, case.body.kind)
-    check_opens(scene, case.body)
     mesh = mesh_of(scene, case.body)
     from studies.meshing.kept_shape import tell_shape  # with the finite elements
 

@@ -21,6 +21,7 @@ from studies.plots.style.style import GREEN, GREY, SMALL, drawing, remark, style
 FRONT = "What the error of 95 of 100 random organs costs in computing time"
 TITLE = "Randomly generated organs: share of a population within an error"
 SHOWN = {"force_end": "error of the force [%]", "mean_error": "mean error / largest u [%]"}
+NO_FORCE = "the scenes compare no force"
 LOWEST = 0.02
 """Errors below are drawn at the edge [%]."""
 STYLES = ("-", (0, (4, 1.6)), (0, (1, 1.2)))
@@ -83,7 +84,7 @@ def _draw(panel: Axes, mine: Sequence[Group], entry: Metric) -> dict[str, Line2D
         label = f"{look.name}, {group.runs[0].case.body.nodes} nodes"
         handles[label] = Line2D([], [], color=look.colour, linestyle=style, linewidth=1.7, label=label)
     if not handles:
-        remark(panel, "nothing is known")
+        remark(panel, NO_FORCE)
     return handles
 
 
@@ -155,10 +156,12 @@ def _draw_front(panel: Axes, bodies: Sequence[tuple[float, Group]], entry: Metri
         bar = [[low], [high]] if low == low else None
         panel.errorbar(cost, error.bound, yerr=bar, marker=look.marker, color=look.colour, capsize=2, linestyle="none")
         nodes = str(group.runs[0].case.body.nodes)
-        panel.annotate(nodes, (cost, error.bound), (4, 4), textcoords="offset points", size=SMALL, color=GREY)
+        panel.annotate(
+            nodes, (cost, error.bound), (2, 5), textcoords="offset points", size=SMALL, color=GREY, rotation=60
+        )
         handles[look.name] = Line2D([], [], marker=look.marker, color=look.colour, linestyle="none", label=look.name)
     if not handles:
-        remark(panel, "the scenes compare no force")
+        remark(panel, NO_FORCE)
     elif bound is not None:
         panel.fill_between([1e-9, 1.0], 1e-12, bound, color=GREEN, alpha=0.12, linewidth=0)
     return handles

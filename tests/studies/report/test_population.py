@@ -74,11 +74,11 @@ def test_a_wider_share_trusts_more():
     assert all(one.trusted for one in found) and tally(found) == (2, 0, 3, 0)
 
 
-def test_even_members_set_the_threshold_and_odd_ones_judge_it():
+def test_even_and_odd_members_are_counted_apart():
     rows = trust_of(bad_and_good()).splitlines()[2:]
     assert rows == [
-        "| 994 and 1,194 nodes, members that judge it | 2 | 1 | 0 | 1 | 0 |",
-        "| 994 and 1,194 nodes, members that set the threshold | 3 | 1 | 1 | 2 | 1 |",
+        "| 994 and 1,194 nodes, members of even number | 3 | 1 | 1 | 2 | 1 |",
+        "| 994 and 1,194 nodes, members of odd number | 2 | 1 | 0 | 1 | 0 |",
     ]
     assert "No results" in trust_of([])
 
