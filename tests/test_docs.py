@@ -19,7 +19,10 @@ PACKAGES = ("massspring", "reference_fem", "studies")
 PAGES = (*(ROOT / name for name in ("README.md", "CHANGELOG.md", "CONTRIBUTING.md", "SECURITY.md")),
          *sorted(ROOT.glob("docs/*.md")))  # fmt: skip
 FENCE = re.compile(r"```python\n(.*?)```", re.DOTALL)
-HISTORY, LONG = "CHANGELOG.md", ("CHANGELOG.md", "CONTRIBUTING.md", "theory.md", "commands.md", "results.md", "cutting.md")
+HISTORY, LONG = (
+    "CHANGELOG.md",
+    ("CHANGELOG.md", "CONTRIBUTING.md", "theory.md", "commands.md", "results.md", "cutting.md"),
+)
 QUOTED = "methods.md"
 """Shows docstrings of the solvers."""
 
