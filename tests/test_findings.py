@@ -143,3 +143,15 @@ def test_methods_of_the_page_are_those_of_the_tuple():
     page = (ROOT / "docs/methods.md").read_text(encoding="utf-8").split("## Claims")[1].split("## ")[0]
     named = re.findall(r"^\| (\w+) \|", page, re.M)
     assert {method.name for method in METHODS} <= set(named)
+
+
+def test_numbers_that_the_page_quotes_of_the_warning():
+    rows = re.findall(r"\| (\d+) " * 5 + r"\|$", (TABLES / "population" / "trust.md").read_text(encoding="utf-8"), re.M)
+    _, beyond, named, within, doubted = (sum(int(row[k]) for row in rows) for k in range(5))
+    said = " ".join((ROOT / "docs/population.md").read_text(encoding="utf-8").split())
+    assert (
+        f"In all it is {named} of {beyond} and {doubted} of {within} ({doubted / within:.0%})".replace("%", " %")
+        in said
+    )
+    brief = " ".join((ROOT / "docs/accuracy.md").read_text(encoding="utf-8").split())
+    assert f"named {named} of {beyond} bad bodies and doubted {doubted} of {within} good ones" in brief
