@@ -22,7 +22,7 @@ PAPER = BodyRecipe("surface", nodes=350)
 """The paper's body, which is cut in pieces alone."""
 UNFORESEEN = tuple(replace(body, cut=VIRTUAL) for body in BODIES if body.kind == "tetrahedral")
 """The same on meshes that do not know the cut."""
-ADVANCING = BODIES[1], BODIES[3]
+ADVANCING = BODIES[1], BODIES[3], BODIES[5]
 """Of scenes whose cut advances: with one volume elements turn over next to the tip."""
 WALLS = BodyRecipe(nodes=400), BodyRecipe(nodes=400, law="cotangent", volumes="nodal")
 """Of hollow organs."""
