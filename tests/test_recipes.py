@@ -217,7 +217,7 @@ def test_an_added_study_keeps_the_contract(recipe, add):
 @pytest.mark.slow
 def test_an_added_study_runs_and_goes_on_where_it_was(recipe, tmp_path):
     study = recipe("study").STUDY
-    assert hold(test_catalog, "study", slow=True, study=[study]) == 1
+    assert hold(test_catalog, "case", slow=True, case=list(study.cases)) == 1
     study = replace(study, cases=tuple(replace(c, scene=replace(c.scene, reference=None)) for c in study.cases))
     assert run_studies(tmp_path, [study], 1, Silent()) == 2
     assert run_studies(tmp_path, [study], 1, Silent()) == 0
