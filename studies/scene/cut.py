@@ -56,7 +56,7 @@ class Cut:
             raise StudyError(f"cut '{self.name}' advances along {along}; give a direction of finite numbers, not all 0")
         if np.linalg.norm(np.cross(along, normal)) <= STEEPEST * size * np.linalg.norm(normal):
             raise StudyError(
-                f"cut '{self.name}' advances along the normal of its plane, over which it so never gets; give a "
+                f"cut '{self.name}' advances along the normal of its plane, so it never crosses it; give a "
                 "direction in the plane"
             )
 

@@ -69,6 +69,14 @@ def test_judgements_are_held_against_the_reference():
     assert tally(found) == (2, 1, 3, 1)
 
 
+def test_where_nothing_is_compared_nothing_is_judged():
+    runs = [
+        replace(one, case=replace(one.case, scene=replace(one.case.scene, quantities=("volume",))))
+        for one in bad_and_good()
+    ]
+    assert judgements(runs) == []
+
+
 def test_a_wider_share_trusts_more():
     found = judgements(bad_and_good(), share=100.0)
     assert all(one.trusted for one in found) and tally(found) == (2, 0, 3, 0)
