@@ -17,7 +17,8 @@ from studies.store.schema import REFERENCE_FIELDS
 def given_scene(scene: Scene) -> Scene:
     """The scene as another program gets it: of one with a cut, the checkpoints after it alone.
 
-    Raises StudyError for a cut whose time matters: one in a scene without equilibria, or one that lets a piece go.
+    Raises StudyError for a cut whose time matters: one in a scene without equilibria, one that lets a piece go, or one
+    that opens a lumen.
     """
     cut = scene.cut
     if cut is None:
@@ -25,7 +26,12 @@ def given_scene(scene: Scene) -> Scene:
     if cut.free or scene.start is not None:
         what = f"cut '{cut.name}' lets a piece go" if cut.free else "it starts in motion"
         raise StudyError(f"scene '{scene.name}' cannot be given away cut from the start: {what}, so its time matters")
-    return replace(scene, checkpoints=tuple(t for t in scene.checkpoints if t > cut.at))
+    if cut.opens_lumen:
+        raise StudyError(
+            f"scene '{scene.name}' cannot be given away cut from the start: cut '{cut.name}' opens a lumen, whose "
+            "volume is kept until then"
+        )
+    return replace(scene, checkpoints=tuple(t for t in scene.checkpoints if t > cut.ends))
 
 
 def reference_of(scene: Scene, reference: Reference | None) -> Reference | None:

@@ -270,11 +270,8 @@ def cut_of(
             flat = stage.mesh.outer()
         else:
             last = body_for(scene, recipe, stage.mesh)
-            parent, cells, flat = (
-                parents(cells, cells_of(stage.mesh)),
-                cells_of(stage.mesh),
-                flat_mesh(stage.mesh, last),
-            )
+            parent, flat = parents(cells, cells_of(stage.mesh)), flat_mesh(stage.mesh, last)
+            cells = cells_of(stage.mesh)
         check_applies(case, last, targets)
         touching = stage.pairs if cut.contact else None
         events.append(event_of(frame, before, last, parent, attachments_for(scene, flat), touching, growth))

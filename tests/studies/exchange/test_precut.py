@@ -27,6 +27,8 @@ from studies.runs.case import BodyRecipe, Case
 from studies.runs.run import measure
 from studies.scene.library import BALL_BISECTED, BALL_CUT_PRESSED, BALL_INCISED, BALL_SQUEEZE
 from studies.scene.library.ball_incised import RADIUS
+from studies.scene.library.liver_cut_live import LIVER_CUT_LIVE
+from studies.scene.library.shell_opened import SHELL_OPENED
 from studies.store.record import read_record
 
 pytestmark = pytest.mark.slow
@@ -203,3 +205,12 @@ def test_a_cut_whose_time_matters_is_not_given_away(tmp_path):
     with pytest.raises(StudyError, match="cut 'section' lets a piece go, so its time matters"):
         export(loose, tmp_path / "loose", NODES)
     assert not (tmp_path / "loose").exists()
+    with pytest.raises(StudyError, match="cut 'opening' opens a lumen, whose volume is kept until then"):
+        export(SHELL_OPENED, tmp_path / "shell", NODES)
+    assert not (tmp_path / "shell").exists()
+
+
+def test_what_comes_while_a_cut_advances_is_left_out():
+    """Without a reference nothing refuses a checkpoint between its begin and its end."""
+    between = replace(LIVER_CUT_LIVE, reference=None, checkpoints=(1.5, 2.5, 4.0))
+    assert given_scene(between).checkpoints == (4.0,)
