@@ -25,7 +25,7 @@ from studies.plots.style.page import (
     unresolved_mark,
     unresolved_notes,
 )
-from studies.plots.style.style import BLACK, GREY, SMALL, drawing, method_colour, remark, styled
+from studies.plots.style.style import BLACK, GREY, SMALL, drawing, remark, styled
 from studies.runs.case import BodyRecipe
 from studies.store.record import Status
 
@@ -99,7 +99,7 @@ def _draw_point(
     """A filled marker where the reference is much better known than the error, else a hollow one; never below the
     uncertainty of the reference. A run that did not end ok is struck out."""
     height = max(error, uncertainty)
-    colour = method_colour(run.case.method.name)
+    colour = looks[run.case.body].colour(run.case.method.name)
     face = colour if uncertainty <= RESOLVED_SHARE * error else "white"
     marker = looks[run.case.body].marker if error > uncertainty else "_"
     axes.plot(x, height, marker=marker, color=colour, markerfacecolor=face, markersize=7.5, markeredgewidth=1.6)

@@ -13,7 +13,7 @@ from studies.metrics.metric import COMPARABLE
 from studies.metrics.metrics import force_end, opening_error
 from studies.metrics.run import Run, by_scene, doubled
 from studies.plots.style.page import blank, finish, page, panels
-from studies.plots.style.render import Camera, draw_surface, frame, scale_bar
+from studies.plots.style.render import Camera, draw_faces, frame, scale_bar, smooth_normals
 from studies.plots.style.style import NORMAL, SMALL, drawing, styled
 
 TITLE = "Incised organs"
@@ -68,7 +68,11 @@ def _draw_row(row: Sequence[Axes], run: Run, camera: Camera) -> None:
     room = 0.06 * (high - low)
     for axes, (points, faces, inside, colour) in zip(row, seen, strict=True):
         colours = np.where(inside[:, None], to_rgb(INSIDE), to_rgb(colour))
-        draw_surface(axes, points, faces, colours, camera, edges=0.12)
+        # The surface and the faces of the cut meet in an edge: light must not run over it.
+        normals = np.empty((len(faces), 3))
+        for part in (inside, ~inside):
+            normals[part] = smooth_normals(points, faces[part])
+        draw_faces(axes, points[faces], normals, colours, camera, edges=0.12)
         frame(axes, low - room, high + room)
     at, force = run.checkpoint_frames, reference.force
     gap, truth = (

@@ -29,12 +29,12 @@ from studies.plots.style.page import (
     unresolved_mark,
     unresolved_notes,
 )
-from studies.plots.style.style import BLACK, GREY, SMALL, drawing, method_colour, styled
+from studies.plots.style.style import BLACK, GREY, SMALL, drawing, styled
 from studies.runs.case import BodyRecipe
 from studies.scene.library import Scene
 
 TITLE = "Force of the press against the reference"
-CUT_TITLE = "Force on the pulled end of a body that is cut, against the reference"
+CUT_TITLE = "Force on the end that is moved, of a body that is cut, against the reference"
 FORCES = [metric for metric in METRICS if metric.name == "force_end"]
 """What is written at the ends of the lines."""
 ROOM = 1.06
@@ -72,17 +72,17 @@ def _draw_scene(axes: Axes, group: Sequence[Run], looks: dict[BodyRecipe, BodyLo
     for same in grouped(group, lambda run: (run.case.body, run.case.method.name)):
         run = same[0]  # another time step lies on the same line; the table shows by how much it does not
         good = slice(0, good_frames(run))
-        colour = method_colour(run.case.method.name)
+        colour = looks[run.case.body].colour(run.case.method.name)
         axes.plot(run.fields.t[good], run.force[good], color=colour, linestyle=looks[run.case.body].line)
         ends.append((float(run.force[good][-1]), _error(run), colour))
-    top = ROOM * _largest(group)
+    low, top = _range(group)
     motion = _motion(group[0].case.scene)
     cut, stop = group[0].case.scene.cut, motion.times[-1]
     _draw_reference(axes, group[0], stop, math.inf if cut is None else cut.at)
     for at in sorted({stop} if cut is None else {cut.at, cut.ends, stop}):
         axes.axvline(at, color=GREY, linewidth=1, linestyle=":")
-    _label(axes, ends, top)
-    axes.set(xlim=(0, 1.015 * group[0].case.scene.duration), ylim=(0, top), xlabel="time [s]", ylabel="force [N]")
+    _label(axes, ends, low, top)
+    axes.set(xlim=(0, 1.015 * group[0].case.scene.duration), ylim=(low, top), xlabel="time [s]", ylabel="force [N]")
     axes.xaxis.set_major_locator(MaxNLocator(5, integer=True))
     mark = unresolved_mark(group, FORCES)
     axes.set_title(f"{heading(group[0].case.scene.name)}{mark}, {_way(group[0], motion)}in {motion.times[-1]:g} s")
@@ -115,11 +115,12 @@ def _error(run: Run) -> str:
     return f"{force_end(run):+.0f} %".replace("-", "−")
 
 
-def _label(axes: Axes, ends: Sequence[tuple[float, str, str]], top: float) -> None:
+def _label(axes: Axes, ends: Sequence[tuple[float, str, str]], low: float, top: float) -> None:
     """Errors to the right of the axis, one under the other where lines end close together."""
     # A line on its way to infinity ends outside the axis; its label stays at the border.
-    heights = np.array([min(max(force, 0.0), top) if np.isfinite(force) else top for force, _, _ in ends]) / top
-    for at, (_, text, colour) in zip(spread_out(heights, LABEL_GAP), ends, strict=True):
+    forces = np.array([force if np.isfinite(force) else top for force, _, _ in ends])
+    heights = (np.clip(forces, low, top) - low) / (top - low)
+    for at, (_, text, colour) in zip(spread_out(heights, LABEL_GAP, 1.0), ends, strict=True):
         axes.text(1.015, at, text, transform=axes.transAxes, color=colour, size=SMALL, va="center", ha="left")
 
 
@@ -141,11 +142,13 @@ def _draw_reference(axes: Axes, run: Run, stop: float, cut: float) -> None:
     axes.plot(t, force, color=BLACK, marker="o", linestyle="", markersize=5.5, markeredgecolor="white", zorder=5)
 
 
-def _largest(group: Sequence[Run]) -> float:
-    """Largest force [N] that is worth room: of the reference and of runs that ended well."""
+def _range(group: Sequence[Run]) -> tuple[float, float]:
+    """Ends of the axis [N]: from zero to the largest force of the reference and of runs that ended well; from the
+    smallest to zero where that is further away, as where a held end is pressed and not pulled."""
     forces = [run.force for run in group if run.record.status in COMPARABLE]
     forces += [run.reference.force for run in group[:1] if run.reference is not None]
-    return max((float(force.max()) for force in forces), default=0.0) or 1.0
+    lowest, highest = (float(end([0.0, *(end(force) for force in forces)])) for end in (np.min, np.max))
+    return (0.0, ROOM * highest or 1.0) if highest >= -lowest else (ROOM * lowest, 0.0)
 
 
 draw = drawing(figure)

@@ -17,18 +17,18 @@ from studies.plots.style.page import (
     blank,
     finish,
     grouped,
-    page,
-    panels,
+    panel_grid,
     reference_handle,
     remarks,
     unresolved_mark,
     unresolved_notes,
 )
-from studies.plots.style.style import BLACK, GREY, method_colour, save, styled
+from studies.plots.style.style import BLACK, GREY, save, styled
 from studies.runs.case import BodyRecipe
 
 TITLE = "Opening of the incision against the reference"
 OPENING = metric("opening_error")
+COLUMNS = 2
 BINS = 8
 """Stretches between front and mouth over which the opening is averaged by area."""
 MM = 1e3
@@ -51,8 +51,8 @@ def figure(runs: Sequence[Run]) -> Figure:
     if not shown:
         return blank(TITLE, "no run of a scene with an incision has ended yet")
     scenes, looks = by_scene(shown), body_looks(shown)
-    sheet = page(6.4 * len(scenes), 3.8)
-    for panel, group in zip(panels(sheet, 1, len(scenes)).flat, scenes.values(), strict=True):
+    sheet, axes = panel_grid(len(scenes), COLUMNS, (5.4, 3.6), (0.4, 0.3))
+    for panel, group in zip(axes.flat, scenes.values(), strict=False):
         _draw_scene(panel, group, looks)
     handles = [*body_method_handles(shown, looks), reference_handle(linestyle="-", linewidth=1)]
     handles.append(band_handle("± its uncertainty"))
@@ -66,8 +66,8 @@ def _draw_scene(axes: Axes, group: Sequence[Run], looks: dict[BodyRecipe, BodyLo
     finest = max(group, key=lambda run: len(run.cut_pairs))
     for same in grouped(group, lambda run: (run.case.body, run.case.method.name)):
         run = same[0]
-        colour, line = method_colour(run.case.method.name), looks[run.case.body].line
-        axes.plot(*_profile(run, run.opening), color=colour, linestyle=line)
+        look = looks[run.case.body]
+        axes.plot(*_profile(run, run.opening), color=look.colour(run.case.method.name), linestyle=look.line)
     if finest.reference is not None:
         truth = finest.reference.opening(finest.fields.rest[finest.cut_pairs[:, 0]])
         depth, opening = _profile(finest, truth)

@@ -1,5 +1,6 @@
 """How well each piece of a body that is cut keeps its volume, and all pieces together."""
 
+import textwrap
 from collections.abc import Sequence
 
 import numpy as np
@@ -15,6 +16,8 @@ from studies.plots.style.style import BLACK, BLUE, GREY, ORANGE, SMALL, drawing,
 
 TITLE = "Volumes of the pieces of a body that is cut"
 COLUMNS = 3
+LETTERS = 34
+"""Of a name in one line above a panel."""
 LOOKS = ((BLUE, "-"), (ORANGE, (0, (5, 1.5))))
 """Of the pieces, in turns."""
 PERCENT = 100.0
@@ -38,8 +41,10 @@ def figure(runs: Sequence[Run]) -> Figure:
     sheet, axes = panel_grid(len(groups), COLUMNS, (3.7, 2.6), (0.4, 0.3), sharex=True, sharey=True)
     for panel, (run, *_) in zip(axes.flat, groups, strict=False):
         _draw_run(panel, run)
-        panel.set_title(f"{heading(run.case.scene.name)}\n{looks[run.case.body].name}", size=SMALL + 0.5)
-        panel.set_xlabel("time [s]")
+        panel.set_title(f"{heading(run.case.scene.name)}\n{textwrap.fill(looks[run.case.body].name, LETTERS)}", size=SMALL)
+    for lowest in axes.flat[max(0, len(groups) - axes.shape[1]) : len(groups)]:
+        lowest.set_xlabel("time [s]")
+        lowest.tick_params(labelbottom=True)
     for left in axes[:, 0]:
         left.set_ylabel("|V/V₀ − 1| [%]")
     most = max(len(np.unique(run.field("cut_parts"))) for run in shown)

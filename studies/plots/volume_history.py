@@ -6,12 +6,11 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.typing import LineStyleType
 
 from studies.base.counting import heading
 from studies.metrics.metric import COMPARABLE
 from studies.metrics.run import Run, by_scene
-from studies.plots.style.bodies import body_looks, body_method_handles
+from studies.plots.style.bodies import BodyLook, body_looks, body_method_handles
 from studies.plots.style.page import (
     blank,
     finish,
@@ -23,7 +22,7 @@ from studies.plots.style.page import (
     reference_handle,
     remarks,
 )
-from studies.plots.style.style import BLACK, GREY, drawing, method_colour, styled
+from studies.plots.style.style import BLACK, GREY, drawing, styled
 
 TITLE = "How much volume each model loses"
 PERCENT = 100.0
@@ -44,7 +43,7 @@ def figure(runs: Sequence[Run]) -> Figure:
         upper.set_title(heading(name))
         for same in grouped(group, lambda run: (run.case.body, run.case.method.name)):
             for run in same:
-                _draw_run(upper, lower, run, looks[run.case.body].line, finer=run is not same[0])
+                _draw_run(upper, lower, run, looks[run.case.body], finer=run is not same[0])
         _draw_reference(upper, lower, group[0])
         lower.set_xlabel("time [s]")
     _scale(axes, shown)
@@ -62,11 +61,11 @@ def _stiffness(shown: Sequence[Run]) -> list[str]:
     return [f"The tissue of the reference gives way a little: κ/μ = {', '.join(f'{ratio:,.0f}' for ratio in ratios)}."]
 
 
-def _draw_run(upper: Axes, lower: Axes, run: Run, line: LineStyleType, finer: bool) -> None:
+def _draw_run(upper: Axes, lower: Axes, run: Run, body: BodyLook, finer: bool) -> None:
     """The first run of a series in full; the same with another step as a thin line where the two differ visibly."""
     good = slice(0, good_frames(run))
     change = PERCENT * (run.volume_ratio[good] - 1)
-    look = {"color": method_colour(run.case.method.name), "linestyle": line}
+    look = {"color": body.colour(run.case.method.name), "linestyle": body.line}
     if not finer:
         upper.plot(run.fields.t[good], change, **look)
     # Zero has no logarithm; an exact volume lies on the bottom of the axis.

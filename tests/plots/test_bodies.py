@@ -11,7 +11,7 @@ from massspring import METHODS, Free, ImplicitVolume
 from studies.plots import force_path, laws, methods, volume_history
 from studies.plots.campaigns import recovery, stability
 from studies.plots.style.bodies import body_looks
-from studies.plots.style.style import BODY_LOOKS, SPARE_LOOKS, method_colour, styled
+from studies.plots.style.style import BLACK, BODY_LOOKS, SPARE_LOOKS, VERMILLION, method_colour, styled
 from studies.scene.library.stomach_press import STOMACH_PRESS
 from tests.plots.made_up import run
 from tests.plots.reading import words
@@ -43,6 +43,16 @@ def test_a_known_body_looks_the_same_in_every_chart():
     for body, look in alone.items():
         assert beside[body] == look
         assert (look.line, look.marker) == BODY_LOOKS["surface"]
+
+
+def test_bodies_of_one_method_have_the_colours_of_their_families():
+    mixed = body_looks([run(kind="surface"), run(), run(nodes=350), run(method=Free())])
+    assert {look.colour("implicit_volume") for look in mixed.values()} == {method_colour("implicit_volume")}
+    surface, coarse, fine = body_looks([run(kind="surface"), run(), run(nodes=350)]).values()
+    assert surface.colour("implicit_volume") == BLACK
+    assert coarse.colour("implicit_volume") == fine.colour("implicit_volume") == VERMILLION
+    (alone,) = body_looks([run()]).values()
+    assert alone.colour("implicit_volume") == method_colour("implicit_volume")
 
 
 def test_dash_patterns_fit_into_a_legend_entry():

@@ -58,6 +58,12 @@ def test_force_error_stands_at_the_end_of_its_line(error, said):
     assert said in words(force_path.figure([run(error=error)]))
 
 
+@pytest.mark.parametrize(("error", "ends"), [(0.2, (0.0, 4.24)), (3.0, (-8.48, 0.0))])
+def test_the_axis_of_the_force_reaches_to_the_largest_of_either_sign(error, ends):
+    (axes,) = force_path.figure([run(error=error)]).axes
+    assert axes.get_ylim() == pytest.approx(ends)
+
+
 def test_force_of_the_reference_holds_when_the_press_stops():
     (axes,) = force_path.figure([run()]).axes
     path, marks = (line for line in lines(axes, BLACK))

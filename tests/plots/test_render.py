@@ -68,6 +68,8 @@ def test_labels_keep_their_order_and_their_distance():
     assert placed[[0, 2, 3]].mean() == pytest.approx(np.mean([0.5, 0.5, 0.52]))
     assert list(np.argsort(placed)) == [1, 0, 2, 3, 4]
     assert len(spread_out(np.array([]), 0.1)) == 0
+    crowded = spread_out(np.array([0.9, 0.95, 1.0, 0.2]), 0.1, 1.0)
+    assert crowded == pytest.approx([0.8, 0.9, 1.0, 0.2])
 
 
 @styled

@@ -10,6 +10,7 @@ from matplotlib.typing import LineStyleType
 
 from studies.base.counting import readable
 from studies.metrics.run import Run, by_scene
+from studies.plots.style.families import family_of
 from studies.plots.style.style import BODY_LOOKS, SPARE_LOOKS, method_colour, method_label
 from studies.runs.case import BodyRecipe
 
@@ -24,6 +25,12 @@ class BodyLook:
     name: str
     line: LineStyleType
     marker: str
+    family_colour: str | None = None
+    """In a chart of one method and several families of bodies; elsewhere the colour is that of the method."""
+
+    def colour(self, method: str) -> str:
+        """Of the body with a method."""
+        return self.family_colour or method_colour(method)
 
 
 def body_looks(runs: Sequence[Run], ignored: Sequence[str] = ()) -> dict[BodyRecipe, BodyLook]:
@@ -35,11 +42,13 @@ def body_looks(runs: Sequence[Run], ignored: Sequence[str] = ()) -> dict[BodyRec
     """
     groups = [list(dict.fromkeys(run.case.body for run in group)) for group in by_scene(runs).values()]
     names = {body: _name(body, groups, ignored) for group in groups for body in group}
+    families = {run.case.body: family_of(run.case).colour for run in runs}
+    by_family = len({run.case.method.name for run in runs}) == 1 < len(set(families.values()))
     spare, free, looks = cycle(SPARE_LOOKS), dict(BODY_LOOKS), {}
     for body, name in names.items():
         if name not in looks:
             line, marker = free.pop(body.series) if body.series in free else next(spare)
-            looks[name] = BodyLook(name, line, marker)
+            looks[name] = BodyLook(name, line, marker, families[body] if by_family else None)
     return {body: looks[name] for body, name in names.items()}
 
 
@@ -60,14 +69,14 @@ def _words(body: BodyRecipe, option: str) -> str:
 
 
 def body_method_handles(runs: Sequence[Run], looks: dict[BodyRecipe, BodyLook], markers: bool = False) -> list[Artist]:
-    """Legend entries for every body and method that occur together: colour is method, line or marker is body."""
+    """Legend entries for every body and method that occur together, as `body_looks` draws them."""
     pairs = dict.fromkeys((looks[run.case.body], run.case.method.name) for run in runs)
     return [body_handle(look, method, markers) for look, method in pairs]
 
 
 def body_handle(look: BodyLook, method: str, markers: bool = False) -> Line2D:
     """The legend entry of one body with one method."""
-    entry = Line2D([], [], color=method_colour(method), label=f"{look.name}, {method_label(method)}")
+    entry = Line2D([], [], color=look.colour(method), label=f"{look.name}, {method_label(method)}")
     if markers:
         entry.set(marker=look.marker, linestyle="", markersize=7)
     else:

@@ -203,10 +203,12 @@ def log_axis(axis: Axis) -> None:
     axis.set_tick_params(which="minor", labelsize=SMALL)
 
 
-def spread_out(heights: np.ndarray, gap: float) -> np.ndarray:
-    """The heights nearest to `heights` (n,), in the same order, at least `gap` apart."""
+def spread_out(heights: np.ndarray, gap: float, highest: float = np.inf) -> np.ndarray:
+    """The heights nearest to `heights` (n,), in the same order, at least `gap` apart and, where that leaves room above
+    zero, no higher than `highest`."""
     order = np.argsort(heights, kind="stable")
     ladder = gap * np.arange(len(heights))
     placed = np.empty(len(heights))
-    placed[order] = isotonic_regression(heights[order] - ladder).x + ladder
+    room = max(highest - ladder[-1], 0.0) if len(ladder) else highest
+    placed[order] = np.minimum(isotonic_regression(heights[order] - ladder).x, room) + ladder
     return placed
