@@ -41,7 +41,8 @@ def figure(runs: Sequence[Run]) -> Figure:
     sheet, axes = panel_grid(len(groups), COLUMNS, (3.7, 2.6), (0.4, 0.3), sharex=True, sharey=True)
     for panel, (run, *_) in zip(axes.flat, groups, strict=False):
         _draw_run(panel, run)
-        panel.set_title(f"{heading(run.case.scene.name)}\n{textwrap.fill(looks[run.case.body].name, LETTERS)}", size=SMALL)
+        name = textwrap.fill(looks[run.case.body].name, LETTERS)
+        panel.set_title(f"{heading(run.case.scene.name)}\n{name}", size=SMALL)
     for lowest in axes.flat[max(0, len(groups) - axes.shape[1]) : len(groups)]:
         lowest.set_xlabel("time [s]")
         lowest.tick_params(labelbottom=True)
