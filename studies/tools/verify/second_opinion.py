@@ -17,7 +17,7 @@ REACH = 0.03
 PULL = 0.02
 """Displacement of the patch, outward [m]."""
 CUT_NODES = 80
-"""Surface nodes of the ball that is cut: about 4,200 unknowns."""
+"""Surface nodes of the ball that is cut: about 2,800 unknowns."""
 
 
 def second_opinions() -> tuple[Oracle, ...]:
