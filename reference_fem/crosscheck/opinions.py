@@ -43,10 +43,11 @@ def oracle(name: str, title: str, build: Callable[[], Problem], fast: bool = Fal
     return Oracle(name, title, source, lambda: Outcome(opinion(build(), title)), fast)
 
 
-def opinions(organ: Callable[[], Problem]) -> tuple[Oracle, ...]:
-    """The three oracles; organ: builds the problem of the third, for meshes of organs are made elsewhere."""
+def opinions(organ: Callable[[], Problem], cut: Callable[[], Problem]) -> tuple[Oracle, ...]:
+    """The four oracles; organ and cut build the problems of the last two, for such meshes are made elsewhere."""
     return (
         oracle("second_ball", "ball with clamped caps, second code", clamped_ball),
         oracle("second_sphere", "thick sphere, second code", thick_sphere),
         oracle("second_organ", "organ pulled by a patch, second code", organ),
+        oracle("second_cut", "ball that is cut open, second code", cut),
     )

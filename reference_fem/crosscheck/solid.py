@@ -7,11 +7,11 @@ its end, so the state at the end alone is of third order.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
+from scipy.spatial import KDTree
 from skfem import MeshTet
 
 from reference_fem.crosscheck.newton import Newton
@@ -50,10 +50,18 @@ class SolidSolution:
     bend: Any
     """Keeps the curves of NGSolve's mesh alive."""
 
-    def displacement(self, points: np.ndarray) -> np.ndarray:
-        """(n, 3) [m] at rest points (n, 3) [m]; outside the body extrapolated from the nearest element."""
-        ng, (elements, local) = load("ngsolve"), self._evaluator.locate(points)
-        found = np.empty((len(points), 3))
+    def displacement(self, points: np.ndarray, among: np.ndarray | None = None) -> np.ndarray:
+        """(n, 3) [m] at rest points (n, 3) [m]; outside the body extrapolated from the nearest element.
+
+        among: the elements that are searched, (ne,) bool: a place on a cut is in those on both sides of it.
+        """
+        chosen = np.arange(self.problem.mesh.nelements) if among is None else np.flatnonzero(among)
+        found, local = self._evaluator(chosen).locate(points)
+        return self._at(chosen[found], local)
+
+    def _at(self, elements: np.ndarray, local: np.ndarray) -> np.ndarray:
+        ng = load("ngsolve")
+        found = np.empty((len(elements), 3))
         for k, (element, place) in enumerate(zip(elements, local, strict=True)):
             corners = self.problem.mesh.t[:4, element].tolist()
             weights = dict(zip(corners, (1.0 - place.sum(), *place), strict=True))
@@ -63,9 +71,12 @@ class SolidSolution:
             found[k] = self.u(element_map(*theirs[:3]))
         return found
 
-    @cached_property
-    def _evaluator(self) -> Evaluator:
-        return Evaluator(self.problem.mesh)
+    def _evaluator(self, chosen: np.ndarray) -> Evaluator:
+        """Of the chosen elements, numbered as they are chosen."""
+        evaluator = Evaluator(self.problem.mesh)
+        evaluator.table, evaluator.corners = evaluator.table[chosen], evaluator.corners[chosen]
+        evaluator.tree = KDTree(evaluator.corners.mean(axis=1))
+        return evaluator
 
 
 def check_solid(problem: Problem) -> None:

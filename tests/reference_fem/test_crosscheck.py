@@ -66,8 +66,8 @@ def test_small_versions_of_the_oracles_agree(problem):
 
 
 @needs_ngsolve
-def test_the_three_opinions():
-    """Each says where it comes from; the organ is built only when it is measured."""
+def test_the_four_opinions():
+    """Each says where it comes from; organs are built only when they are measured."""
     mesh = block((2, 2, 2))
     low, high = (np.flatnonzero(np.abs(mesh.p[2] - z) < 1e-9) for z in (0.0, 1.0))
     built = []
@@ -76,9 +76,9 @@ def test_the_three_opinions():
         built.append(pulled_organ(mesh, low, high, (0.0, 0.1, 0.2)))
         return built[0]
 
-    found = opinions(organ)
+    found = opinions(organ, organ)
     assert not built
-    assert [oracle.name for oracle in found] == ["second_ball", "second_sphere", "second_organ"]
+    assert [oracle.name for oracle in found] == ["second_ball", "second_sphere", "second_organ", "second_cut"]
     assert all("NGSolve" in oracle.source and not oracle.fast for oracle in found)
     outcome = found[2].measure()
     assert len(built) == 1

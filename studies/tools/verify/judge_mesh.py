@@ -8,6 +8,7 @@ import numpy as np
 from reference_fem import NeoHookean, PrescribedDisplacement, Problem, nodes
 from studies.geometry import curved
 from studies.meshing.held_mesh import held_mesh
+from studies.meshing.opened_mesh import opened_elements
 from studies.meshing.scene_mesh import mesh_for
 from studies.meshing.true_shape import as_curved, on_true_shape, true_shape
 from studies.reference.problem import rigid
@@ -25,14 +26,17 @@ class JudgeMesh:
 
 
 def judged_problem(scene: Scene, mesh: JudgeMesh) -> Problem:
-    """The scene on a mesh of the judge's, curved onto the true shape and outlines. Raises StudyError."""
+    """The scene on a mesh of the judge's, curved onto the true shape and outlines, opened if the scene cuts it.
+    Raises StudyError."""
     organ_mesh, shape = mesh_for(scene, mesh.nodes, even=True), true_shape(scene.organ)
     assert shape is not None  # the judged organs are of the catalogue
     coarse = held_mesh(scene, organ_mesh)
     body = coarse.refined(scene, mesh.at_outlines, 0)
-    solid = as_curved(body, coarse, on_true_shape(curved(organ_mesh), coarse, shape, scene.held))
+    solid = as_curved(body, coarse, on_true_shape(curved(organ_mesh), coarse, shape, scene.held, scene.cut))
     *patches, _ = body.facets(solid)
     tissue, x = scene.tissue, nodes(solid)
+    if scene.cut is not None:  # copies of a node stay where it was, so `x` holds them too
+        solid, _ = opened_elements(solid, body.cut_faces)
     return Problem(
         mesh=solid,
         material=NeoHookean(tissue.shear_modulus, tissue.shear_modulus * tissue.bulk_over_shear),

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.spatial import KDTree
 
 from reference_fem import NeoHookean, crosscheck
 from reference_fem.crosscheck.meridian import Ball, MeridianMesh, MeridianSolution, between_planes, clamped_caps
@@ -20,11 +21,14 @@ from reference_fem.oracles import Check, Oracle, Outcome
 from studies.reference.load import Reference, load_reference
 from studies.reference.reference_solves import reference_fingerprint, reference_solves
 from studies.reference.solve import solve
-from studies.scene.library import BALL_CLAMPED, BALL_SQUEEZE, LIVER_PRESS
+from studies.scene.library import BALL_CLAMPED, BALL_INCISED, BALL_SQUEEZE, LIVER_PRESS
 from studies.scene.library.ball_clamped import CAP
 from studies.scene.scene import Scene
 from studies.store.entry import why_stale
 from studies.tools.verify.judge_mesh import JudgeMesh, judged_problem
+
+TOGETHER = 1e-6
+"""Of the size: two vertices so near are copies of one; a published reference is rounded."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,8 +49,25 @@ class OrganSolution:
         return self.solid.mesh
 
     def displacement(self, points: np.ndarray) -> np.ndarray:
-        """(n, 3) [m] at rest points (n, 3) [m]."""
-        return self.solid.displacement(points)
+        """(n, 3) [m] at rest points (n, 3) [m], about the middle between the held regions; of a place on a cut that
+        behind it."""
+        cut, found = self.scene.cut, np.empty_like(points)
+        sides = np.zeros(len(points), bool) if cut is None else cut.plane.level(points) > 0
+        for front in np.unique(sides):
+            found[sides == front] = self._on_side(points[sides == front], front)
+        return centred(self.scene, found)
+
+    def opening(self, points: np.ndarray) -> np.ndarray:
+        """Displacement in front of the scene's cut less that behind it, (n, 3) [m], at `points` (n, 3) [m] of it."""
+        return self._on_side(points, True) - self._on_side(points, False)
+
+    def _on_side(self, points: np.ndarray, front: bool) -> np.ndarray:
+        """Displacement at points (n, 3) [m] of the body in front of the cut, or behind it; without one all is."""
+        if self.scene.cut is None:
+            return self.solid.displacement(points)
+        mesh = self.solid.problem.mesh
+        middles = mesh.p[:, mesh.t[:4]].mean(axis=1).T
+        return self.solid.displacement(points, (self.scene.cut.plane.level(middles) > 0) == front)
 
 
 Solution = MeridianSolution | OrganSolution
@@ -103,10 +124,16 @@ def moving(scene: Scene, path: Callable) -> list[float]:
     return [*before, scene.checkpoints[-1]]
 
 
+def incised_ball(mesh: JudgeMesh) -> OrganSolution:
+    """ball_incised, opened from the start: the tissue has no memory."""
+    return OrganSolution(BALL_INCISED, solve_solid(judged_problem(BALL_INCISED, mesh), BALL_INCISED.checkpoints))
+
+
 JUDGES = (
     Judge(BALL_SQUEEZE, squeezed, MeridianMesh(0.14, 0), MeridianMesh(0.1, 0)),
     Judge(BALL_CLAMPED, clamped, MeridianMesh(0.2, 4), MeridianMesh(0.1, 4)),
     Judge(LIVER_PRESS, pressed_liver, JudgeMesh(300, 2), JudgeMesh(480, 3), "solid", "tetrahedra"),
+    Judge(BALL_INCISED, incised_ball, JudgeMesh(120, 1), JudgeMesh(200, 2), "solid", "tetrahedra"),
 )
 
 
@@ -147,7 +174,25 @@ def verdict(judge: Judge, reference: Reference) -> Outcome:
         apart, own = surface_mean(reference, fine), surface_mean(reference, fine, coarse)
         allowed = bars["surface_mean"] + own
         checks.append(Check("mean distance of surfaces", "1", 0.0, apart, allowed, place, count, absolute=True))
+    if isinstance(fine, OrganSolution) and isinstance(coarse, OrganSolution) and judge.scene.cut is not None:
+        apart, own = openings_apart(reference, fine, coarse)
+        checks.append(
+            Check("distance of openings", "1", 0.0, apart, bars["opening"] + own, place, count, absolute=True)
+        )
     return Outcome(tuple(checks))
+
+
+def openings_apart(reference: Reference, fine: OrganSolution, coarse: OrganSolution) -> tuple[float, float]:
+    """Relative L2 of the opening of a cut between the reference and the fine judge, and between the two judges [1], at
+    the vertices of the reference's coarsest mesh that the cut parts."""
+    count, vertices = len(reference.at.points), reference.mesh.p.T[: reference.mesh.nvertices]
+    pairs = KDTree(vertices).query_pairs(TOGETHER * reference.size, output_type="ndarray")
+    first = np.unique(pairs.min(axis=1))
+    places = vertices[first[first < count]]
+    ours, theirs = reference.meshes[0].opening, fine.opening(places)
+    change = coarse.opening(places) - theirs
+    size = float(np.linalg.norm(theirs))
+    return float(np.linalg.norm(ours - theirs)) / size, float(np.linalg.norm(change)) / size
 
 
 def surface_mean(reference: Reference, judge: Solution, other: Solution | None = None) -> float:

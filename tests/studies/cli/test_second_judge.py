@@ -1,15 +1,19 @@
 """References of scenes beside the second judge: what is compared, what is allowed, and what would be seen."""
 
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
-from reference_fem import crosscheck, facet_nodes, nodes
+from reference_fem import crosscheck, equilibrium_path, facet_nodes, nodes
+from reference_fem.crosscheck import solid
 from reference_fem.crosscheck.meridian import MeridianMesh
 from studies.geometry.organs.liver import LIVER
-from studies.scene.library import BALL_CLAMPED, BALL_SQUEEZE, LIVER_PRESS
+from studies.reference.load import reference_for
+from studies.reference.sample import parted
+from studies.scene.library import BALL_CLAMPED, BALL_INCISED, BALL_SQUEEZE, LIVER_PRESS
 from studies.tools.verify import second_judge
 from studies.tools.verify.judge_mesh import JudgeMesh, judged_problem
 from studies.tools.verify.second_judge import (
@@ -20,6 +24,7 @@ from studies.tools.verify.second_judge import (
     centred,
     halves,
     moving,
+    openings_apart,
     second_judges,
     verdict,
 )
@@ -72,13 +77,14 @@ def test_the_judged_scenes_are_named(monkeypatch, tmp_path):
         "judge_ball_squeeze",
         "judge_ball_clamped",
         "judge_liver_press",
+        "judge_ball_incised",
     ]
     assert not any(oracle.fast for oracle in second_judges(tmp_path))
 
 
 def test_an_organ_is_judged_on_a_mesh_of_its_own_that_lies_on_the_true_shape():
     """No reference has so many surface nodes; the held region is the whole bare area and stays, the plane moves."""
-    assert LIVER_PRESS.reference.base not in {judge.nodes for judge in (JUDGES[-1].coarse, JUDGES[-1].fine)}
+    assert LIVER_PRESS.reference.base not in {judge.nodes for judge in (JUDGES[2].coarse, JUDGES[2].fine)}
     plain, halved = (judged_problem(LIVER_PRESS, JudgeMesh(200, times)) for times in (0, 1))
     assert halved.mesh.nelements > plain.mesh.nelements
     surface = np.unique(facet_nodes(plain.mesh))
@@ -98,3 +104,33 @@ def test_the_force_of_an_organ_is_the_one_that_its_scene_probes():
     push = 3.0 * np.asarray(LIVER_PRESS.probed.direction)
     solved: Any = SimpleNamespace(obstacle_force=push[None], held_force=-2 * push[None])
     np.testing.assert_allclose(OrganSolution(LIVER_PRESS, solved).force, [3.0])
+
+
+@pytest.mark.skipif(not crosscheck.available(), reason="NGSolve is not installed: pip install organbench[crosscheck]")
+def test_the_judge_of_a_cut_agrees_with_the_reference_on_one_mesh(monkeypatch):
+    """At second order on the same opened mesh: forces, and displacement on either side of every place of the cut."""
+    monkeypatch.setattr(solid, "ORDER", solid.PATH_ORDER)
+    problem = judged_problem(BALL_INCISED, JudgeMesh(60, 0))
+    times = BALL_INCISED.checkpoints
+    ours = equilibrium_path(problem, times)[-1]
+    theirs = OrganSolution(BALL_INCISED, solid.solve_solid(problem, times))
+    np.testing.assert_allclose(theirs.solid.held_force, ours.held_force, atol=1e-3 * np.abs(ours.held_force).max())
+    behind, front = parted(nodes(problem.mesh), len(ours.u)).T
+    opening = ours.u[front] - ours.u[behind]
+    largest = np.abs(opening).max()
+    assert largest > 0.1 * BALL_INCISED.organ.parameters["radius"]
+    places = nodes(problem.mesh)[behind]
+    np.testing.assert_allclose(theirs.opening(places), opening, atol=2e-3 * largest)
+    moved = centred(BALL_INCISED, ours.u[behind])
+    np.testing.assert_allclose(theirs.displacement(places), moved, atol=2e-3 * largest)
+
+
+def test_a_judge_that_sees_half_of_the_opening_is_told():
+    """Where the reference's coarsest mesh is parted the two are compared; a published mesh is rounded."""
+    reference = reference_for(Path(), BALL_INCISED)
+    half, whole = (
+        SimpleNamespace(opening=lambda at, share=share: share * reference.opening(at)) for share in (0.5, 1.0)
+    )
+    apart, change = openings_apart(reference, whole, half)
+    assert apart < 0.03
+    assert change == pytest.approx(0.5, rel=1e-9)
