@@ -40,7 +40,7 @@ REGULAR = 1.0 / (6.0 * np.sqrt(2.0))
 """Volume of a regular tetrahedron over the cube of its edge."""
 CHILD = 0.25
 """Of an element's error indicator that each half of it is expected to have."""
-LOST, MORE = 1.0, 2.0
+LOST, MORE = 0.5 * HELD_AREA, 2.0
 """Error of the area of a held region [%] with which the coarsest mesh is taken as it is; otherwise finer ones are
 tried, up to so many times its surface nodes. Two hanging spleens lost 5 and 6 % at 270 nodes, 0.2 and 0.3 % at 292:
 their references turned too far (docs/population.md)."""
