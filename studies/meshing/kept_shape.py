@@ -1,6 +1,7 @@
 """How well a body at rest keeps the shape of its organ and the area where it is held: a warning where it does not."""
 
 import warnings
+from collections.abc import Callable
 
 import numpy as np
 
@@ -16,11 +17,14 @@ from studies.meshing.scene_mesh import patch_nodes
 from studies.meshing.true_surface import shape_errors, true_surface
 from studies.scene.inertia import top_speed
 from studies.scene.organ_file import remeshed
-from studies.scene.scene import Held, Scene
+from studies.scene.scene import Held, Organ, Scene
 
 TOUCHED = 0.6
 """Facets that touch a probe at the end over those that at rest are where it will be: .5 to .8 of 40 pressed livers and
 stomachs; in Hertz's contact half of the area."""
+FINER = 1.08
+"""Ratio of the vertices of meshes that are tried for one that keeps the area of all held regions: a mesh may cut off an
+end where the organ is held, and the next finer one not."""
 
 
 def tell_shape(scene: Scene, mesh: OrganMesh | QuadraticMesh, filled: bool) -> None:
@@ -72,13 +76,35 @@ def touched_facets(scene: Scene, mesh: OrganMesh | QuadraticMesh) -> float | Non
 
 
 def held_area_error(scene: Scene, mesh: OrganMesh | QuadraticMesh, held: Held) -> float:
-    """Area of the facets of a held region over that of the region on the true surface, less 1 [1]; NaN where that is
-    not known, or the region is off the surface: the run tells that."""
-    truth = true_surface(scene.organ)
+    """Area of the facets of a held region of a body over the true one, less 1 [1]; NaN as `area_error`."""
+    return area_error(scene.organ, held, mesh.points, held_facets(mesh, held))
+
+
+def area_error(organ: Organ, held: Held, points: np.ndarray, facets: np.ndarray) -> float:
+    """Area of `facets` (f, 3 or 6) between `points` (n, 3) [m] over that of the held region on the true surface, less 1
+    [1]; NaN where that is not known, or the region is off the surface: the run tells that."""
+    truth = true_surface(organ)
     area = 0.0 if truth is None else region_area(held.region, *truth.sides[OUTER])
     if not area > 0.0:
         return float("nan")
-    return float(triangle_areas(*along_facets(mesh.points, held_facets(mesh, held))).sum()) / area - 1.0
+    return float(triangle_areas(*along_facets(points, facets)).sum()) / area - 1.0
+
+
+def level_that_holds(level: int, most: int, lost: Callable[[int], float], bound: float) -> int:
+    """Of the levels from `level` on, each finer by FINER, up to `most` the first that has at most `bound` `lost`; where
+    none has, the one with the least. Raises StudyError, the first one, where none can be meshed."""
+    found, failed = list[tuple[float, int]](), list[StudyError]()
+    while level <= most or not (found or failed):
+        try:
+            found.append((lost(level), level))
+            if found[-1][0] <= bound:
+                return level
+        except StudyError as error:  # a neighbour of this level may be meshed
+            failed.append(error)
+        level = max(level + 1, round(FINER * level))
+    if not found:
+        raise failed[0]
+    return min(found)[1]
 
 
 def held_facets(mesh: OrganMesh | QuadraticMesh, held: Held) -> np.ndarray:

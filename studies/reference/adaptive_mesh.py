@@ -21,7 +21,7 @@ from studies.geometry.surface.node_count import FEWEST
 from studies.meshing.bounds import HELD_AREA
 from studies.meshing.graded_mesh import check_number, halved, is_hollow, mesh_at, middles, outer_nodes
 from studies.meshing.held_mesh import HeldMesh
-from studies.meshing.kept_shape import held_area_error
+from studies.meshing.kept_shape import held_area_error, level_that_holds
 from studies.meshing.nested_mesh import marked
 from studies.meshing.opened_mesh import opened_elements
 from studies.meshing.quadratic_mesh import QuadraticMesh
@@ -35,9 +35,8 @@ from studies.scene.scene import Scene
 
 SOLID, HOLLOW = 0.7, 0.8
 """Nodes of the coarse body over those of the adapted one (measured: docs/accuracy.md)."""
-FINER, MOST = 1.08, 0.95
-"""Coarse meshes, each finer by the factor, are tried up to a share of the adapted nodes for one that keeps the area of
-all held regions: a mesh may cut off the end where an organ is held, and the next finer one not."""
+MOST = 0.95
+"""The same at most, for a mesh that keeps the area of all held regions."""
 LOOSE = NewtonSettings(force_tol=1e-4, penetration_tol=1e-3)
 """Enough to rank elements."""
 STEP = 1.25
@@ -75,14 +74,11 @@ def coarse_mesh(scene: Scene, wanted: int) -> tuple[OrganMesh, HeldMesh]:
     """The organ's mesh with a share of the `wanted` nodes on its outer surface, mid-side nodes among them, or a larger
     share where that loses area of a held region; the best where all do."""
     share = HOLLOW if is_hollow(scene) else SOLID
-    level, found = max(FEWEST, round((share * wanted + 6) / 4)), list[tuple[float, int]]()
-    while True:
-        lost = lost_area(scene, level)
-        found.append((lost, level))
-        level = max(level + 1, round(FINER * level))
-        if lost <= HELD_AREA or not remeshed(scene.organ) or 4 * level - 6 > MOST * wanted:
-            break
-    organ_mesh, coarse, _ = halved(scene, min(found)[1], 0, 0)
+    level = max(FEWEST, round((share * wanted + 6) / 4))
+    if remeshed(scene.organ):
+        most = int((MOST * wanted + 6) / 4)
+        level = level_that_holds(level, most, lambda tried: lost_area(scene, tried), HELD_AREA)
+    organ_mesh, coarse, _ = halved(scene, level, 0, 0)
     return organ_mesh, coarse
 
 

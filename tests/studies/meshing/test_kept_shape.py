@@ -9,7 +9,7 @@ import pytest
 from studies.base.errors import StudyError
 from studies.geometry import HalfSpace
 from studies.meshing import kept_shape
-from studies.meshing.kept_shape import held_area_error, held_facets, tell_shape, touched_facets
+from studies.meshing.kept_shape import held_area_error, held_facets, level_that_holds, tell_shape, touched_facets
 from studies.meshing.scene_mesh import mesh_for
 from studies.runs.case import BodyRecipe
 from studies.runs.prepare import mesh_of, prepare
@@ -110,3 +110,21 @@ def test_the_flat_stomach_of_400_nodes_holds_too_little():
 def test_curved_bodies_hold_the_area_that_their_scene_holds(mesh_cache, scene):
     mesh = mesh_of(scene, BodyRecipe("quadratic", 794))
     assert [held.name for held in scene.held if abs(held_area_error(scene, mesh, held)) > 0.03] == []
+
+
+def test_the_first_level_that_holds_enough_is_taken_and_else_the_best():
+    lost = {100: 5.0, 108: 2.0, 117: 0.5, 126: 0.1}
+    assert level_that_holds(100, 130, lost.__getitem__, 1.0) == 117
+    assert level_that_holds(100, 110, lost.__getitem__, 1.0) == 108, "the best of 100 and 108"
+    assert level_that_holds(100, 90, lost.__getitem__, 1.0) == 100, "the first is always tried"
+
+
+def test_a_level_that_cannot_be_meshed_is_passed_over():
+    def lost(level):
+        if level < 108:
+            raise StudyError(f"{level} nodes fold")
+        return 0.0
+
+    assert level_that_holds(100, 130, lost, 1.0) == 108
+    with pytest.raises(StudyError, match="100 nodes fold"):
+        level_that_holds(100, 105, lost, 1.0)

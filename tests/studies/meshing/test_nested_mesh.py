@@ -8,13 +8,17 @@ import pytest
 from skfem import MeshTet, MeshTet2
 
 from reference_fem import NewtonSettings, facet_nodes, nodes
-from reference_fem.elements.shapes import build_elements, element_nodes
+from reference_fem.elements.shapes import build_elements, check_neighbours, element_nodes
 from reference_fem.system.saddle_point import System
+from studies.base.errors import StudyError
+from studies.catalog.population.draw import member
 from studies.geometry import HalfSpace
 from studies.geometry.mesh.jacobian import smallest_jacobian
 from studies.geometry.mesh.organ_mesh import tetrahedron_volumes
-from studies.meshing.held_mesh import with_patches
-from studies.meshing.nested_mesh import LEAST, SHARE, NestedMesh, at_nodes, base_mesh, marked, upright
+from studies.meshing.held_mesh import held_mesh, with_patches
+from studies.meshing.kept_shape import area_error
+from studies.meshing.nested_mesh import LEAST, LOST, SHARE, NestedMesh, at_nodes, base_mesh, marked, upright
+from studies.meshing.scene_mesh import mesh_for
 from studies.reference.nested import problem_of
 from studies.scene.cut import Cut
 from studies.scene.library import BALL_CLAMPED
@@ -267,3 +271,28 @@ def test_the_faces_of_a_cut_stay_in_its_plane_where_the_surface_leans_over_it():
         after = np.roll(ring, -1, axis=1)
         area = 0.5 * np.abs((ring[..., 0] * after[..., 1] - ring[..., 1] * after[..., 0]).sum(axis=1)).sum()
         assert area / 2 == pytest.approx(np.pi * (RADIUS**2 - height**2), rel=8e-3)
+
+
+HANGING = member("spleen", 0, 0), member("spleen", 0, 1)
+"""At 270 surface nodes both lose the end of the hilum; of the second the next finer mesh has an element that folds
+between the points where the reference integrates it."""
+
+
+@pytest.mark.parametrize("scene", HANGING, ids=lambda scene: scene.name)
+def test_the_coarsest_mesh_keeps_the_area_that_is_held_and_no_part_of_it_folds(scene):
+    given = scene.reference.base
+    plain = held_mesh(scene, mesh_for(scene, given, on_shape=True))
+    corners = area_error(scene.organ, scene.held[0], plain.mesh.p.T, plain.patches[0])
+    assert corners < -0.04, "an end is lost with so many nodes as the plan has"
+    mesh = base_mesh(scene, given, 0)
+    assert mesh.lost_area < LOST and given < len(np.unique(facet_nodes(mesh.mesh)[:, :3])) < 1.2 * given
+    assert smallest_jacobian(mesh.points, element_nodes(mesh.mesh)).min() > 0.0
+    halved = mesh.finer(np.ones(mesh.mesh.nelements), 2 * mesh.mesh.nelements)[0]
+    check_neighbours(halved.mesh)  # refuses an element that folds
+    assert halved.lost_area < LOST
+
+
+def test_a_region_that_no_mesh_keeps_has_no_reference(monkeypatch):
+    monkeypatch.setattr(NestedMesh, "lost_area", 4.2)
+    with pytest.raises(StudyError, match=r"from 80 to 160 surface nodes .* at least 4.2 % off .*allowed: 3 %.*base"):
+        base_mesh(BALL_CLAMPED, 80, 0)
