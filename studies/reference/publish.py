@@ -39,7 +39,7 @@ def finer(scene: Scene, most: float = MOST) -> Scene:
 def judged_scenes() -> dict[str, Scene]:
     """Scenes of the catalogue whose reference is published, by name: all that have one, but those in which the faces of
     a cut touch."""
-    opened = [scene for scene in CUT if scene.cut is not None and not scene.cut.contact]
+    opened = [scene for scene in CUT if not any(cut.contact for cut in scene.cuts)]
     return {scene.name: scene for scene in (*JUDGED, *opened) if scene.reference is not None}
 
 
