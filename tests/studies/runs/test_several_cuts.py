@@ -54,7 +54,7 @@ def judged(tmp_path_factory) -> dict[str, Run]:
 
 
 def test_both_incisions_gape_as_in_the_reference(judged):
-    for kind, most in (("tetrahedral", 20.0), ("quadratic", 8.0)):
+    for kind, most, alike in (("tetrahedral", 20.0, 0.25), ("quadratic", 8.0, 0.08)):
         run = judged[kind]
         assert run.record.status == "ok", run.record.message
         assert METRIC["opening_error"](run) < most
@@ -68,16 +68,8 @@ def test_both_incisions_gape_as_in_the_reference(judged):
         # They are mirror images, on meshes that are not: to discretization.
         widest = [run.gap(run.opening)[run.cut_of_pairs == k].max() for k in (0, 1)]
         truth = run.gap(run.reference.opening(run.fields.rest[run.cut_pairs[:, 0]]))
-        print(
-            kind,
-            widest,
-            [float(truth[run.cut_of_pairs == k].max()) for k in (0, 1)],
-            METRIC["opening_error"](run),
-            METRIC["mean_error"](run),
-            METRIC["force_end"](run),
-        )
-        assert widest[0] == pytest.approx(widest[1], rel=0.8) and min(widest) > 0.05 * RADIUS
-        assert truth[run.cut_of_pairs == 0].max() == pytest.approx(truth[run.cut_of_pairs == 1].max(), rel=0.05)
+        assert widest[0] == pytest.approx(widest[1], rel=alike) and min(widest) > 0.05 * RADIUS
+        assert truth[run.cut_of_pairs == 0].max() == pytest.approx(truth[run.cut_of_pairs == 1].max(), rel=0.01)
 
 
 def test_each_pair_belongs_to_the_cut_in_whose_plane_it_lies(judged):
