@@ -19,6 +19,7 @@ def check_study(study: Study, drawn: bool = True) -> list[str]:
     if study.accepts(Status.FAILED):
         return []
     for case in study.cases:
-        if case.scene.cut is not None and case.frames:
-            event_frames(case.scene, case.scene.cut, case.frames)
+        if case.frames:
+            for cut in case.scene.cuts:
+                event_frames(case.scene, cut, case.frames)
     return [sentence for scene in study.scenes for sentence in check_scene(scene)]

@@ -34,9 +34,9 @@ def bodies_of(scene: Scene) -> tuple[BodyRecipe, ...]:
     """The bodies that run a scene with a cut."""
     if scene.lumen is not None:
         return WALLS
-    if scene.cut is not None and scene.cut.until is not None:
+    if any(cut.until is not None for cut in scene.cuts):
         return ADVANCING
-    return BODIES if scene.cut is not None and scene.cut.within is not None else (PAPER, *BODIES)
+    return BODIES if any(cut.within is not None for cut in scene.cuts) else (PAPER, *BODIES)
 
 
 CUTTING = Study(

@@ -71,7 +71,7 @@ class GivenMesh:
     @cached_property
     def volumes(self) -> Volumes:
         """What is measured: the volume of the tissue or of each of its pieces, and that of a lumen that is filled."""
-        if self.scene.cut is not None:
+        if self.scene.cuts:
             cells = self.body.tetrahedra.astype(np.int64)
             piece = pieces_of(self.points, cells)
             surfaces = {f"piece {k}": boundary_triangles(cells[piece == k]) for k in range(piece.max() + 1)}
@@ -115,9 +115,9 @@ def given_mesh(scene: Scene, nodes: int, kind: str) -> GivenMesh:
     """The mesh of a kind with `nodes` vertices on its outer surface. Raises StudyError where it cannot be made."""
     made = mesh_for(scene, nodes) if kind == STRAIGHT else mesh_at(scene, nodes, 0, 0, True)
     assert isinstance(made, QuadraticMesh) == (kind == CURVED)
-    if scene.cut is None:
+    if not scene.cuts:
         return GivenMesh(scene, kind, made, int(made.outer_count))
-    after = opened_mesh(made, scene.cut.name)
+    after = opened_mesh(made)
     return GivenMesh(scene, kind, after.mesh, int(made.outer_count), after.pairs)
 
 

@@ -18,8 +18,13 @@ def given_scene(scene: Scene) -> Scene:
     """The scene as another program gets it: of one with a cut, the checkpoints after it alone.
 
     Raises StudyError for a cut whose time matters: one in a scene without equilibria, one that lets a piece go, or one
-    that opens a lumen.
+    that opens a lumen; and for several cuts.
     """
+    if len(scene.cuts) > 1:
+        raise StudyError(
+            f"scene '{scene.name}' cannot be given away cut from the start: it has {len(scene.cuts)} cuts, and files "
+            "and words of an export are of one"
+        )
     cut = scene.cut
     if cut is None:
         return scene

@@ -62,7 +62,7 @@ def mesh_at(scene: Scene, level: int, at_outlines: int, at_contact: int, quadrat
 
 def middles(scene: Scene) -> float:
     """Where the middles of sides stand that leave an outline of the scene's held regions (DRAWN)."""
-    if not scene.held and scene.cut is None:
+    if not scene.held and not scene.cuts:
         return MIDDLE
     return HUNG if load_of(scene) == "sag" else DRAWN
 

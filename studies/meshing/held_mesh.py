@@ -28,8 +28,8 @@ class HeldMesh:
     """Vertices before any refinement [m], (n, 3)."""
     patches: list[np.ndarray]
     """Of each held region and last of the lumen: its triangles of `corners`, (f, 3). A finer mesh has parts of them."""
-    cut: np.ndarray = field(default_factory=lambda: np.empty((0, 3), np.int64))
-    """Of the scene's cut its faces between tetrahedra of `corners`, (f, 3), seen from in front of it."""
+    cuts: list[np.ndarray] = field(default_factory=list)
+    """Of each of the scene's cuts its faces between tetrahedra of `corners`, (f, 3), seen from in front of it."""
 
     def facets(self, mesh: MeshTet2) -> list[np.ndarray]:
         """Of each patch the six nodes of its facets (f, 6) in the second-order mesh with the same vertices."""
@@ -41,33 +41,33 @@ class HeldMesh:
         ]
 
     @cached_property
-    def cut_faces(self) -> np.ndarray:
-        """The faces of this mesh that are parts of the cut, seen from in front of it, (f, 3)."""
-        if not len(self.cut):
-            return self.cut
+    def faces_of_cuts(self) -> list[np.ndarray]:
+        """The faces of this mesh that are parts of each cut, seen from in front of it, (f, 3)."""
         x, reach = self.mesh.p.T, SAME_POINT * float(np.ptp(self.corners))
-        inner = np.asarray(self.mesh.f2t)[1] >= 0
-        faces = np.asarray(self.mesh.facets).T[inner].astype(np.int64)
-        faces = faces[distance_to_surface(x[faces].mean(axis=1), self.corners, self.cut) < reach]
-        normals = triangle_normals(x, faces)
-        # A sheet is flat: faces that stand across it have their middle beside it.
-        normal = triangle_normals(self.corners, self.cut[:1])[0]
-        return np.where((normals @ normal < 0)[:, None], faces[:, ::-1], faces)
+        found = []
+        for cut in self.cuts:
+            inner = np.asarray(self.mesh.f2t)[1] >= 0
+            faces = np.asarray(self.mesh.facets).T[inner].astype(np.int64)
+            faces = faces[distance_to_surface(x[faces].mean(axis=1), self.corners, cut) < reach]
+            normals = triangle_normals(x, faces)
+            # A sheet is flat: faces that stand across it have their middle beside it.
+            normal = triangle_normals(self.corners, cut[:1])[0]
+            found.append(np.where((normals @ normal < 0)[:, None], faces[:, ::-1], faces))
+        return found
 
     @property
-    def front(self) -> np.ndarray:
-        """Vertices of the front of the cut, where it ends inside the body: there the stress is singular."""
-        return np.unique(self._rim[0])
-
-    @property
-    def trace(self) -> np.ndarray:
-        """Sides of faces of the cut in the outer surface, (t, 2)."""
-        return self._rim[1]
+    def cut_faces(self) -> np.ndarray:
+        """The same of all cuts together."""
+        return np.concatenate([np.empty((0, 3), np.int64), *self.faces_of_cuts])
 
     @cached_property
-    def _rim(self) -> tuple[np.ndarray, np.ndarray]:
-        """Sides of the cut's front and of its trace, (s, 2) and (t, 2)."""
-        sides = np.sort(self.cut_faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+    def front(self) -> np.ndarray:
+        """Vertices of the fronts of cuts, where they end inside the body: there the stress is singular."""
+        return np.unique(self.rim(self.cut_faces)[0])
+
+    def rim(self, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Sides of the front and of the trace in the outer surface of `faces` (f, 3) of cuts, (s, 2) and (t, 2)."""
+        sides = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
         sides, count = np.unique(sides, axis=0, return_counts=True)
         sides, count = sides.reshape(-1, 2), np.asarray(count)
         outer = unique_edges(boundary_triangles(self.mesh.t.T.astype(np.int64)))
@@ -132,7 +132,7 @@ def held_mesh(scene: Scene, organ_mesh: OrganMesh) -> HeldMesh:
     patches = [patch_nodes(organ_mesh, held.name, held.region) for held in scene.held]
     lumen = np.arange(organ_mesh.outer_count, organ_mesh.surface_count)
     body = with_patches(straight(organ_mesh), [*patches, lumen])
-    return body if scene.cut is None else replace(body, cut=organ_mesh.cuts[scene.cut.name])
+    return replace(body, cuts=[organ_mesh.cuts[cut.name] for cut in scene.cuts])
 
 
 def straight(organ_mesh: OrganMesh) -> MeshTet:

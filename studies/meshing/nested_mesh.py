@@ -72,27 +72,40 @@ class NestedMesh:
 
     @cached_property
     def _opened(self) -> tuple[MeshTet2, np.ndarray]:
-        return opened_elements(self.mesh, self.body.cut_faces)
+        return self.opened_until(np.inf)
+
+    def opened_until(self, t: float) -> tuple[MeshTet2, np.ndarray]:
+        """The mesh opened along the cuts that the scene makes before time t [s], and for each of its nodes the one of
+        `mesh` that it was, (n',). Raises StudyError."""
+        ways = zip(self.scene.cuts, self.body.faces_of_cuts, strict=True)
+        made = [faces for cut, faces in ways if cut.at < t]
+        if not made:
+            return self.mesh, np.arange(len(nodes(self.mesh)))
+        return opened_elements(self.mesh, np.concatenate(made))
 
     @property
     def solved(self) -> MeshTet2:
-        """The mesh that is solved: opened along the scene's cut, if it has one."""
-        return self.mesh if self.scene.cut is None else self._opened[0]
+        """The mesh that is solved last: opened along all the scene's cuts."""
+        return self._opened[0]
 
     @property
     def parent(self) -> np.ndarray:
-        """For each node of the mesh that is solved the one of `mesh` that it was, (n',)."""
-        return np.arange(len(nodes(self.mesh))) if self.scene.cut is None else self._opened[1]
+        """For each node of the mesh that is solved last the one of `mesh` that it was, (n',)."""
+        return self._opened[1]
 
     @cached_property
     def held(self) -> list[np.ndarray]:
         """Nodes of each held region, in `mesh`."""
         return [np.unique(facets) for facets in self.body.facets(self.mesh)[:-1]]
 
+    def held_in(self, parent: np.ndarray) -> list[np.ndarray]:
+        """The same in an opened mesh, whose nodes were `parent` (n',)."""
+        return [np.flatnonzero(np.isin(parent, held)) for held in self.held]
+
     @cached_property
     def patches(self) -> list[np.ndarray]:
-        """The same in the mesh that is solved."""
-        return [np.flatnonzero(np.isin(self.parent, held)) for held in self.held]
+        """The same in the mesh that is solved last."""
+        return self.held_in(self.parent)
 
     @cached_property
     def small_at_outlines(self) -> np.ndarray:

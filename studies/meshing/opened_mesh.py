@@ -1,6 +1,6 @@
 """The mesh of an organ after its cut: the same cells, their faces on the cut part of the boundary."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import TypeVar
@@ -40,34 +40,46 @@ def cells_of(mesh: OrganMesh | QuadraticMesh) -> np.ndarray:
     return mesh.cells if isinstance(mesh, QuadraticMesh) else mesh.tetrahedra
 
 
-def opened_in_stages(mesh: OrganMesh | QuadraticMesh, cut: Cut, shares: Sequence[float]) -> list[Opened | None]:
-    """An organ's mesh opened as far as its cut has come after each of the ascending `shares` of its way, the last
-    of which is 1; None where no face opened since the share before. Raises StudyError for a cut that does not open it.
-    """
-    whole = opened_mesh(mesh, cut.name)
-    if cut.along is None:
-        return [whole]
-    faces, parting = mesh.cuts[cut.name], np.zeros(len(mesh.points), dtype=bool)
+def opened_in_stages(mesh: OrganMesh | QuadraticMesh, cuts: Sequence[Cut], shares: np.ndarray) -> list[Opened | None]:
+    """An organ's mesh opened as far as its cuts have come at each of e events; None where no face opened since the one
+    before. shares (e, c): of the way of each cut, never less than before and in the end 1; below 0 before it begins.
+
+    Raises StudyError for a cut that does not open it."""
+    whole = opened_mesh(mesh)
+    parting = np.zeros(len(mesh.points), dtype=bool)
     parting[whole.parent[whole.pairs[:, 0]]] = True
-    parting &= np.bincount(faces.ravel(), minlength=len(parting)) > 0  # without the nodes between corners
-    stages = faces_in_stages(faces, parting, mesh.points @ np.asarray(cut.along, float), shares[:-1])
-    stages.append(np.ones(len(faces), dtype=bool))
-    counts = [0, *(int(chosen.sum()) for chosen in stages)]
+    ways = {cut.name: _on_the_way(mesh, cut, parting, way) for cut, way in zip(cuts, shares.T, strict=True)}
+    stages = [{name: mesh.cuts[name][way[k]] for name, way in ways.items()} for k in range(len(shares))]
+    counts = [0, *(sum(map(len, faces.values())) for faces in stages)]
     return [
-        None if now == was else opened_mesh(mesh, cut.name, chosen)
-        for chosen, (was, now) in zip(stages, pairwise(counts), strict=True)
+        None if now == was else whole if now == counts[-1] else opened_mesh(mesh, faces)
+        for faces, (was, now) in zip(stages, pairwise(counts), strict=True)
     ]
 
 
-def opened_mesh(mesh: OrganMesh | QuadraticMesh, name: str, chosen: np.ndarray | None = None) -> Opened:
-    """An organ's mesh opened along its cut `name`, or the `chosen` of its faces (f,) bool; of a hollow one the surface
+def _on_the_way(mesh: OrganMesh | QuadraticMesh, cut: Cut, parting: np.ndarray, shares: np.ndarray) -> np.ndarray:
+    """Which faces of a cut are open at each share (e,) of its way, (e, f) bool; `parting` (n,) bool: the nodes that all
+    cuts double."""
+    faces = mesh.cuts[cut.name]
+    opens = np.repeat((shares >= 0)[:, None], len(faces), axis=1)
+    moves = (shares >= 0) & (shares < 1)
+    if cut.along is not None and moves.any():
+        parting = parting & (np.bincount(faces.ravel(), minlength=len(parting)) > 0)  # none between corners
+        way = mesh.points @ np.asarray(cut.along, float)
+        opens[moves] = faces_in_stages(faces, parting, way, shares[moves].tolist())
+    return opens
+
+
+def opened_mesh(mesh: OrganMesh | QuadraticMesh, along: Mapping[str, np.ndarray] | None = None) -> Opened:
+    """An organ's mesh opened along faces (f, 3) of its cuts by name (None: all of them); of a hollow one the surface
     of the lumen is then a part of the outer one. Raises StudyError for a cut that does not open it."""
-    quadratic, faces = isinstance(mesh, QuadraticMesh), mesh.cuts[name]
-    cells = cells_of(mesh)
+    along = mesh.cuts if along is None else along
+    quadratic, cells = isinstance(mesh, QuadraticMesh), cells_of(mesh)
     try:
-        opening = opened(cells, faces if chosen is None else faces[chosen], len(mesh.points))
+        opening = opened(cells, np.concatenate(list(along.values())), len(mesh.points))
     except MassSpringError as error:
-        raise StudyError(f"{mesh.name}: cut '{name}' does not open it: {error}") from error
+        names = "' or '".join(along)
+        raise StudyError(f"{mesh.name}: cut '{names}' does not open it: {error}") from error
     after = opening.cells.astype(np.int64)
     boundary = (boundary_facets(after) if quadratic else boundary_triangles(after)).astype(np.int64)
     outer = np.unique(boundary)

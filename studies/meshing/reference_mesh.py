@@ -47,7 +47,7 @@ def on_true_sides(scene: Scene, organ_mesh: OrganMesh, coarse: HeldMesh, body: H
         return mesh
     if scene.organ.shape != "file":
         smooth = curved(organ_mesh, may_fold=True)
-        bent = as_curved(body, coarse, on_true_shape(smooth, coarse, shape, scene.held, scene.cut))
+        bent = as_curved(body, coarse, on_true_shape(smooth, coarse, shape, scene.held, scene.cuts))
         if not _folds(bent):
             return bent
     points = laid_out(scene, organ_mesh, coarse, body, shape)

@@ -29,8 +29,8 @@ def mesh_for(
     if lookup(scene.organ.shape, [*SHAPES, "file"], "organ") != "file":
         sides = None if even else "curved" if on_shape else "straight"
         given = scene.organ.parameters
-        return organ(scene.organ.shape, nodes, scene.regions, filled, given, layers, sides=sides, cut=scene.cut)
-    if scene.cut is not None:
+        return organ(scene.organ.shape, nodes, scene.regions, filled, given, layers, sides=sides, cuts=scene.cuts)
+    if scene.cuts:
         raise StudyError(f"scene '{scene.name}' cuts an organ of a file; only organs of the catalogue are cut so far")
     source, how = scanned(scene.organ, scene.name)
     if remeshed(scene.organ):

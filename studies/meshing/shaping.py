@@ -18,7 +18,7 @@ from studies.meshing.held_mesh import HeldMesh, rim_sides
 from studies.meshing.outlines import drawn_middles
 from studies.meshing.quadratic_mesh import TURNED, QuadraticMesh, uprightness
 from studies.meshing.retreat import Measure, retreat
-from studies.meshing.true_shape import as_curved, in_cut_plane, on_true_shape, true_shape
+from studies.meshing.true_shape import as_curved, in_cut_planes, on_true_shape, true_shape
 from studies.scene.scene import Scene
 
 OFF = 1e-3
@@ -139,7 +139,7 @@ def laid_out(scene: Scene, organ_mesh: OrganMesh, coarse: HeldMesh, fine: HeldMe
     """Nodes of the finer mesh [m], (n, 3), as curved as the coarse one, whose sides follow the true shape as far as
     that folds none of its elements. Raises StudyError."""
     plain = MeshTet2.from_mesh(coarse.mesh)
-    bent = on_true_shape(curved(organ_mesh, may_fold=True, shape=shape), coarse, shape, scene.held, scene.cut)
+    bent = on_true_shape(curved(organ_mesh, may_fold=True, shape=shape), coarse, shape, scene.held, scene.cuts)
     cells, straight = upright_cells(coarse), nodes(plain)
     points = moved(straight, nodes(bent), cells, upright_against(straight, cells), organ_mesh.name)
     return nodes(as_curved(fine, coarse, replace(plain, doflocs=np.ascontiguousarray(points.T))))
@@ -181,7 +181,7 @@ def aimed(scene: Scene, fine: HeldMesh, shape: Shape, points: np.ndarray) -> np.
     for region, facets in zip((h.region for h in scene.held), held, strict=True):
         rim = np.unique(rim_sides(facets))
         points[rim] = project(shape, points[rim], (region.level,))
-    return in_cut_plane(points, fine, shape, scene.cut)
+    return in_cut_planes(points, fine, shape, scene.cuts)
 
 
 def all_facets(body: HeldMesh) -> list[np.ndarray]:
@@ -218,8 +218,8 @@ def named_patches(scene: Scene, name: str, held: list[np.ndarray], new: np.ndarr
 
 
 def named_cuts(scene: Scene, body: HeldMesh, new: np.ndarray) -> dict[str, np.ndarray]:
-    """The faces of the scene's cut, in their new numbers."""
-    return {} if scene.cut is None else {scene.cut.name: new[body.cut_faces]}
+    """The faces of the scene's cuts, in their new numbers."""
+    return {cut.name: new[faces] for cut, faces in zip(scene.cuts, body.faces_of_cuts, strict=True)}
 
 
 def upright_cells(body: HeldMesh) -> np.ndarray:

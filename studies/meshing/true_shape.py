@@ -32,9 +32,9 @@ def true_shape(organ: Organ) -> Shape | None:
 
 
 def on_true_shape(
-    smooth: CurvedMesh, body: HeldMesh, shape: Shape, helds: tuple[Held, ...], cut: Cut | None = None
+    smooth: CurvedMesh, body: HeldMesh, shape: Shape, helds: tuple[Held, ...], cuts: tuple[Cut, ...] = ()
 ) -> MeshTet2:
-    """The mesh with the nodes of its boundary on the true surfaces, those of outlines and of the trace of a cut on the
+    """The mesh with the nodes of its boundary on the true surfaces, those of outlines and of the traces of cuts on the
     true ones.
 
     smooth: `studies.geometry.curved` of the same vertices and tetrahedra.
@@ -48,24 +48,25 @@ def on_true_shape(
     for held, facets in zip(helds, body.facets(mesh)[: len(helds)], strict=True):
         rim = np.unique(rim_sides(facets))
         points[rim] = project(shape, points[rim], (held.region.level,))
-    points = in_cut_plane(points, body, shape, cut)
+    points = in_cut_planes(points, body, shape, cuts)
     return replace(mesh, doflocs=np.ascontiguousarray(points.T))
 
 
-def in_cut_plane(points: np.ndarray, body: HeldMesh, shape: Shape, cut: Cut | None) -> np.ndarray:
-    """P2 nodes at `points` (n, 3) [m] with those of the faces of a cut in its plane, those of its trace also on the
+def in_cut_planes(points: np.ndarray, body: HeldMesh, shape: Shape, cuts: tuple[Cut, ...]) -> np.ndarray:
+    """P2 nodes at `points` (n, 3) [m] with those of the faces of each cut in its plane, those of its trace also on the
     true surface: a side that follows the surface alone leaves the plane, and so do those that smoothing bends."""
-    if cut is None:
+    if not cuts:
         return points
-    mesh, points, faces = MeshTet2.from_mesh(body.mesh), points.copy(), body.cut_faces
-    sides = np.unique(np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1), axis=0).reshape(-1, 2)
-    flat, trace = (
-        np.concatenate([np.unique(vertices), mesh.nvertices + edge_index(mesh, ends)])
-        for vertices, ends in ((faces, sides), (body.trace, body.trace))
-    )
-    normal = np.asarray(cut.plane.normal, float)
-    points[flat] -= np.outer(cut.plane.level(points[flat]), normal / np.linalg.norm(normal))
-    points[trace] = project(shape, points[trace], (cut.plane.level,))
+    mesh, points = MeshTet2.from_mesh(body.mesh), points.copy()
+    for cut, faces in zip(cuts, body.faces_of_cuts, strict=True):
+        sides = np.unique(np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1), axis=0).reshape(-1, 2)
+        _, outside = body.rim(faces)
+        flat, trace = (
+            np.concatenate([np.unique(vertices), mesh.nvertices + edge_index(mesh, ends)])
+            for vertices, ends in ((faces, sides), (outside, outside))
+        )
+        points[flat] -= np.outer(cut.plane.level(points[flat]), cut.unit_normal)
+        points[trace] = project(shape, points[trace], (cut.plane.level,))
     return points
 
 

@@ -13,7 +13,7 @@ def piece_worst(run: Run) -> float:
     """100 max |V/V0 − 1| of a piece over all frames after the cut and the clock that leads volumes back [%].
 
     NaN without a cut, and for a run that ended before it."""
-    if run.case.scene.cut is None:
+    if not run.case.scene.cuts:
         return float("nan")
     volume, target = run.part_volumes
     arrived = (np.abs(target / target[-1] - 1) < THERE).all(axis=1)
@@ -25,7 +25,7 @@ def piece_worst(run: Run) -> float:
 
 def piece_sum_worst(run: Run) -> float:
     """100 max |ΣV/ΣV0 − 1| of all pieces together over all frames [%]; NaN without a cut."""
-    if run.case.scene.cut is None:
+    if not run.case.scene.cuts:
         return float("nan")
     volume, target = run.part_volumes
     return PERCENT * float(np.abs(volume.sum(axis=1) / target[-1].sum() - 1).max())

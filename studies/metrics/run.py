@@ -18,6 +18,7 @@ from studies.metrics.timing.protocol import FrameTiming
 from studies.reference.load import Reference
 from studies.reference.solution import BESIDE
 from studies.runs.case import Case, case_from_json
+from studies.scene.cut import nearest_cut
 from studies.store.record import Record, read_record
 from studies.store.schema import RunAttributes, RunFields
 
@@ -121,11 +122,11 @@ class Run:
     def places(self) -> np.ndarray:
         """Where the reference is asked for each node [m], (n, 3): at rest, on a cut a little on the node's own side."""
         rest, scene = self.fields.rest, self.case.scene
-        if scene.cut is None:
+        if not scene.cuts:
             return rest
-        places = rest.copy()
-        places[self.cut_pairs[:, 0]] -= self._step_beside
-        places[self.cut_pairs[:, 1]] += self._step_beside
+        places, step = rest.copy(), BESIDE * self.size * self._pair_normals
+        places[self.cut_pairs[:, 0]] -= step
+        places[self.cut_pairs[:, 1]] += step
         return places
 
     @cached_property
@@ -137,8 +138,23 @@ class Run:
 
     @property
     def cut_pairs(self) -> np.ndarray:
-        """Nodes behind the cut and in front of it, (p, 2)."""
+        """Nodes behind a cut and in front of it, (p, 2)."""
         return np.asarray(self.fields.cut_pairs)
+
+    @cached_property
+    def cut_of_pairs(self) -> np.ndarray:
+        """The number of the scene's cut that parted each pair, (p,)."""
+        return nearest_cut(self.case.scene.cuts, self.fields.rest[self.cut_pairs[:, 0]])
+
+    @property
+    def _pair_normals(self) -> np.ndarray:
+        """The unit normal of the cut of each pair, (p, 3)."""
+        return np.array([cut.unit_normal for cut in self.case.scene.cuts])[self.cut_of_pairs]
+
+    def gap(self, opening: np.ndarray) -> np.ndarray:
+        """The opening of each pair, as vectors (p, 3) [m], along the normal of its cut [m], (p,); below 0 where the
+        faces overlap."""
+        return (opening * self._pair_normals).sum(axis=1)
 
     @cached_property
     def opening(self) -> np.ndarray:
@@ -203,29 +219,22 @@ class Run:
 
     def _outside(self, points: np.ndarray, facets: np.ndarray) -> np.ndarray:
         """Those of the boundary's facets (f, 3 or 6) that are not faces of a cut, which lie on each other at rest."""
-        return facets if self.case.scene.cut is None else facets[~doubled(points, facets, self.size)]
+        return facets if not self.case.scene.cuts else facets[~doubled(points, facets, self.size)]
 
     def _on_own_side(self, points: np.ndarray, facets: np.ndarray) -> np.ndarray:
         """Nodes at `points` (n, 3) [m] of boundary `facets` (f, 3 or 6), those at the mouth of a cut a little on the
         side of their facets: the nearest place on a body is on both sides of its own mouth, which a cut parts."""
-        cut = self.case.scene.cut
-        if cut is None:
-            return points
-        sides = np.sign(cut.plane.level(points[facets[:, :3]].mean(axis=1)))
-        nodes = facets.ravel()
-        side, count = (
-            np.bincount(nodes, np.repeat(weights, facets.shape[1]), minlength=len(points))
-            for weights in (sides, np.ones(len(facets)))
-        )
-        near = (np.abs(cut.plane.level(points)) < BESIDE * self.size) & (np.abs(side) == count)
-        return points + np.outer(np.where(near, np.sign(side), 0.0), self._step_beside)
-
-    @property
-    def _step_beside(self) -> np.ndarray:
-        """From a place on the cut to one that is surely in front of it [m], (3,)."""
-        assert self.case.scene.cut is not None  # there is one
-        normal = np.asarray(self.case.scene.cut.plane.normal, float)
-        return BESIDE * self.size * normal / np.linalg.norm(normal)
+        nodes, moved = facets.ravel(), points
+        for cut in self.case.scene.cuts:
+            sides = np.sign(cut.plane.level(points[facets[:, :3]].mean(axis=1)))
+            side, count = (
+                np.bincount(nodes, np.repeat(weights, facets.shape[1]), minlength=len(points))
+                for weights in (sides, np.ones(len(facets)))
+            )
+            near = (np.abs(cut.plane.level(points)) < BESIDE * self.size) & (np.abs(side) == count)
+            step = np.where(near, BESIDE * self.size * np.sign(side), 0.0)
+            moved = moved + np.outer(step, cut.unit_normal)
+        return moved
 
     @cached_property
     def shape(self) -> ShapeErrors:

@@ -30,9 +30,9 @@ DPI = 150
 
 
 def incised(run: Run) -> bool:
-    """Whether the run has an incision with a front, its end, a checkpoint before the cut, and a reference."""
-    cut = run.case.scene.cut
-    whole = cut is not None and cut.within is not None and run.case.scene.checkpoints[0] <= cut.at
+    """Whether the run has an incision with a front, its end, a checkpoint before all cuts, and a reference."""
+    cuts, first = run.case.scene.cuts, run.case.scene.checkpoints[0]
+    whole = any(cut.within is not None for cut in cuts) and all(first <= cut.at for cut in cuts)
     return whole and run.reference is not None and run.record.status in COMPARABLE
 
 
@@ -53,9 +53,8 @@ def figure(runs: Sequence[Run]) -> Figure:
 
 
 def _draw_row(row: Sequence[Axes], run: Run, camera: Camera) -> None:
-    reference, cut = run.reference, run.case.scene.cut
-    assert reference is not None and cut is not None  # incised() asked
-    normal = np.asarray(cut.plane.normal) / np.linalg.norm(cut.plane.normal)
+    reference = run.reference
+    assert reference is not None  # incised() asked
     rest, triangles = run.fields.rest, run.fields.triangles.astype(np.int64)
     nodes, facets = reference.field("nodes"), reference.triangles
     seen = [
@@ -76,7 +75,7 @@ def _draw_row(row: Sequence[Axes], run: Run, camera: Camera) -> None:
         frame(axes, low - room, high + room)
     at, force = run.checkpoint_frames, reference.force
     gap, truth = (
-        1e3 * float((each @ normal).max()) for each in (run.opening, reference.opening(rest[run.cut_pairs[:, 0]]))
+        1e3 * float(run.gap(each).max()) for each in (run.opening, reference.opening(rest[run.cut_pairs[:, 0]]))
     )
     off = f"{force_end(run):+.1f} %".replace("-", "−")
     words = (

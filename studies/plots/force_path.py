@@ -55,7 +55,7 @@ def figure(runs: Sequence[Run]) -> Figure:
         _draw_scene(panel, group, looks)
     reference = reference_handle(linestyle="-", linewidth=1)
     handles = [*body_method_handles(shown, looks), reference, band_handle("± its uncertainty")]
-    cut = any(run.case.scene.cut is not None for run in shown)
+    cut = any(run.case.scene.cuts for run in shown)
     dotted = "the cut, and the end of the motion" if cut else "the press stops"
     notes = [f"At the end of each line: its error there, once everything is at rest. Dotted: {dotted}."]
     return finish(
@@ -77,9 +77,9 @@ def _draw_scene(axes: Axes, group: Sequence[Run], looks: dict[BodyRecipe, BodyLo
         ends.append((float(run.force[good][-1]), _error(run), colour))
     low, top = _range(group)
     motion = _motion(group[0].case.scene)
-    cut, stop = group[0].case.scene.cut, motion.times[-1]
-    _draw_reference(axes, group[0], stop, math.inf if cut is None else cut.at)
-    for at in sorted({stop} if cut is None else {cut.at, cut.ends, stop}):
+    cuts, stop = group[0].case.scene.cuts, motion.times[-1]
+    _draw_reference(axes, group[0], stop, min((cut.at for cut in cuts), default=math.inf))
+    for at in sorted({stop}.union(*({cut.at, cut.ends} for cut in cuts))):
         axes.axvline(at, color=GREY, linewidth=1, linestyle=":")
     _label(axes, ends, low, top)
     axes.set(xlim=(0, 1.015 * group[0].case.scene.duration), ylim=(low, top), xlabel="time [s]", ylabel="force [N]")

@@ -38,56 +38,59 @@ SHUT = 1e-3
 
 def gapes(run: Run) -> bool:
     """Whether the run has an incision with a front that opens, and its end."""
-    cut = run.case.scene.cut
-    if cut is None or cut.within is None or run.record.status not in COMPARABLE:
+    if not fronts(run) or run.record.status not in COMPARABLE:
         return False
-    return float((run.opening @ cut.plane.normal).max()) > SHUT * run.size
+    return float(run.gap(run.opening).max()) > SHUT * run.size
+
+
+def fronts(run: Run) -> list[int]:
+    """The numbers of the cuts of its scene that end inside the organ."""
+    return [k for k, cut in enumerate(run.case.scene.cuts) if cut.within is not None]
 
 
 @styled
 def figure(runs: Sequence[Run]) -> Figure:
-    """One panel per scene."""
+    """One panel for each incision of a scene."""
     shown = [run for run in runs if gapes(run)]
     if not shown:
         return blank(TITLE, "no run of a scene with an incision has ended yet")
-    scenes, looks = by_scene(shown), body_looks(shown)
-    sheet, axes = panel_grid(len(scenes), COLUMNS, (5.4, 3.6), (0.4, 0.3))
-    for panel, group in zip(axes.flat, scenes.values(), strict=False):
-        _draw_scene(panel, group, looks)
+    looks = body_looks(shown)
+    incisions = [(group, k) for group in by_scene(shown).values() for k in fronts(group[0])]
+    sheet, axes = panel_grid(len(incisions), COLUMNS, (5.4, 3.6), (0.4, 0.3))
+    for panel, (group, k) in zip(axes.flat, incisions, strict=False):
+        _draw_cut(panel, group, k, looks)
     handles = [*body_method_handles(shown, looks), reference_handle(linestyle="-", linewidth=1)]
     handles.append(band_handle("± its uncertainty"))
     notes = ["Across the cut along its normal, at the last checkpoint, averaged over stretches of equal depth."]
     return finish(sheet, TITLE, handles, [*notes, *unresolved_notes(shown, (OPENING,)), *remarks(runs)], columns=3)
 
 
-def _draw_scene(axes: Axes, group: Sequence[Run], looks: dict[BodyRecipe, BodyLook]) -> None:
+def _draw_cut(axes: Axes, group: Sequence[Run], number: int, looks: dict[BodyRecipe, BodyLook]) -> None:
     scene = group[0].case.scene
-    assert scene.cut is not None  # gapes() asked
     finest = max(group, key=lambda run: len(run.cut_pairs))
     for same in grouped(group, lambda run: (run.case.body, run.case.method.name)):
         run = same[0]
         look = looks[run.case.body]
-        axes.plot(*_profile(run, run.opening), color=look.colour(run.case.method.name), linestyle=look.line)
+        axes.plot(*_profile(run, run.opening, number), color=look.colour(run.case.method.name), linestyle=look.line)
     if finest.reference is not None:
         truth = finest.reference.opening(finest.fields.rest[finest.cut_pairs[:, 0]])
-        depth, opening = _profile(finest, truth)
+        depth, opening = _profile(finest, truth, number)
         spread = finest.reference.total_uncertainty["opening"] * opening
         axes.fill_between(depth, opening - spread, opening + spread, color=GREY, alpha=0.3, linewidth=0)
         axes.plot(depth, opening, color=BLACK, linewidth=1, marker="o", markeredgecolor="white")
     axes.set(xlim=(0, None), ylim=(0, None), xlabel="distance from the front [mm]", ylabel="opening [mm]")
-    axes.set_title(heading(scene.name) + unresolved_mark(group, (OPENING,)))
+    which = f", {scene.cuts[number].name}" if len(scene.cuts) > 1 else ""
+    axes.set_title(heading(scene.name) + which + unresolved_mark(group, (OPENING,)))
 
 
-def _profile(run: Run, opening: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Distances from the front [mm] and the mean opening there [mm], of the stretches that hold nodes."""
-    cut = run.case.scene.cut
-    assert cut is not None and cut.within is not None  # gapes() asked
-    depth = -cut.within.level(run.fields.rest[run.cut_pairs[:, 0]])
-    gap = opening @ np.asarray(cut.plane.normal) / np.linalg.norm(cut.plane.normal)
+def _profile(run: Run, opening: np.ndarray, number: int) -> tuple[np.ndarray, np.ndarray]:
+    """Distances from the front of a cut [mm] and the mean opening there [mm], of the stretches that hold nodes."""
+    within, here = run.case.scene.cuts[number].within, run.cut_of_pairs == number
+    assert within is not None  # fronts() asked
+    depth = -within.level(run.fields.rest[run.cut_pairs[here, 0]])
+    gap, weights = run.gap(opening)[here], run.cut_weights[here]
     place = np.minimum((BINS * depth / depth.max()).astype(int), BINS - 1)
-    share, moment, sums = (
-        np.bincount(place, weights=run.cut_weights * values, minlength=BINS) for values in (1.0, depth, gap)
-    )
+    share, moment, sums = (np.bincount(place, weights=weights * values, minlength=BINS) for values in (1.0, depth, gap))
     used = share > 0
     return MM * moment[used] / share[used], MM * sums[used] / share[used]
 

@@ -27,7 +27,7 @@ SMALLEST = 1e-8
 
 def parts(run: Run) -> bool:
     """Whether the run has frames of a body that its cut parts."""
-    return run.case.scene.cut is not None and has_frames(run) and len(np.unique(run.field("cut_parts"))) > 1
+    return bool(run.case.scene.cuts) and has_frames(run) and len(np.unique(run.field("cut_parts"))) > 1
 
 
 @styled
@@ -52,7 +52,7 @@ def figure(runs: Sequence[Run]) -> Figure:
     handles = [Line2D([], [], color=c, linestyle=s, label=f"piece {k + 1}") for k, (c, s) in enumerate(_looks(most))]
     handles.append(Line2D([], [], color=BLACK, linewidth=1.0, label="all together"))
     notes = [
-        "Dotted: the cut. Before it a piece is a part of the body with no volume of its own to keep; after it each is "
+        "Dotted: a cut. Before it a piece is a part of the body with no volume of its own to keep; after it each is "
         "led to its volume on one clock."
     ]
     return finish(sheet, TITLE, handles, [*notes, *remarks(shown)], columns=4)
@@ -63,13 +63,12 @@ def _looks(count: int) -> list[tuple]:
 
 
 def _draw_run(axes: Axes, run: Run) -> None:
-    cut, good = run.case.scene.cut, slice(0, good_frames(run))
-    assert cut is not None  # parts() asked
+    good = slice(0, good_frames(run))
     volume, target = run.part_volumes
     for (colour, line), of_piece, rest in zip(_looks(volume.shape[1]), volume.T, target[-1], strict=True):
         axes.plot(run.fields.t[good], _off(of_piece[good], rest), color=colour, linestyle=line)
     axes.plot(run.fields.t[good], _off(volume[good].sum(axis=1), target[-1].sum()), color=BLACK, linewidth=1.0)
-    for at in sorted({cut.at, cut.ends}):
+    for at in sorted({at for cut in run.case.scene.cuts for at in (cut.at, cut.ends)}):
         axes.axvline(at, color=GREY, linewidth=1, linestyle=":")
     axes.set_yscale("log")
     axes.set(xlim=(0, run.case.scene.duration), ylim=(SMALLEST, PERCENT))

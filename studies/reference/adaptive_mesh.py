@@ -100,7 +100,7 @@ def why_not(scene: Scene) -> str | None:
 
 
 def indicator_of(scene: Scene, organ_mesh: OrganMesh, coarse: HeldMesh) -> np.ndarray:
-    """The error indicator of the elements of the coarse body, opened along the scene's cut, at its last checkpoint,
+    """The error indicator of the elements of the coarse body, opened along the scene's cuts, at its last checkpoint,
     (ne,), over the largest.
 
     Raises StudyError where no equilibrium is found."""
@@ -109,7 +109,7 @@ def indicator_of(scene: Scene, organ_mesh: OrganMesh, coarse: HeldMesh) -> np.nd
         *held, wall = coarse.facets(mesh)
         middle = nodes(mesh)[wall[:, :3]].mean(axis=1)
         patches = [np.unique(facets) for facets in held]
-        if scene.cut is not None:  # the front of the cut strains what is around it
+        if scene.cuts:  # the front of a cut strains what is around it
             mesh, parent = opened_elements(mesh, coarse.cut_faces)
             patches = [np.flatnonzero(np.isin(parent, patch)) for patch in patches]
         problem = problem_on(scene, mesh, patches, middle)

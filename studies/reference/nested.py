@@ -8,7 +8,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from massspring.body.opening import parents
 from reference_fem import Checkpoint, Equilibrium, NewtonSettings, Problem, SolveError, equilibrium_path, nodes
+from reference_fem.elements.shapes import element_nodes
 from reference_fem.estimate import stress_indicator
 from reference_fem.statics.equilibrium import advance, describe
 from reference_fem.statics.nested import carried, continued, transfer
@@ -61,8 +63,11 @@ class MeshSolution(NamedTuple):
     @property
     def equilibria(self) -> list[Equilibrium]:
         """At every checkpoint, by the nodes of the mesh that is solved last."""
-        found = [describe(part.system, state, state.iterations, 1) for part in self.parts for state in part.states]
-        return in_last_mesh(self.mesh, found)
+        found = list[Equilibrium]()
+        for system, states in self.parts:
+            here = [describe(system, state, state.iterations, 1) for state in states]
+            found += in_last_mesh(self.mesh, system.problem, here)
+        return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,33 +146,43 @@ def path_of(
         try:
             path = equilibrium_path(*(one if better is None else better(*one)), on_checkpoint=on_checkpoint)
         except SolveError as error:
-            raise SolveError(str(error), converged=[*found, *in_last_mesh(mesh, error.converged)]) from error
-        found += in_last_mesh(mesh, [e for e in path if e.t in one[1]])
+            reached = in_last_mesh(mesh, one[0], error.converged)
+            raise SolveError(str(error), converged=[*found, *reached]) from error
+        found += in_last_mesh(mesh, one[0], [e for e in path if e.t in one[1]])
     return found
 
 
 def problem_of(mesh: NestedMesh) -> Problem:
-    """The scene on one of its nested meshes, opened if it is cut. Raises StudyError where the cut comes last."""
+    """The scene on one of its nested meshes, opened if it is cut. Raises StudyError where a cut comes last."""
     check_judged_after_cut(mesh.scene)
     return problem_on(mesh.scene, mesh.solved, mesh.patches, mesh.lumen)
 
 
 def problems_of(mesh: NestedMesh) -> list[Work]:
-    """The scene on one of its nested meshes with its checkpoints: the uncut body up to its cut, if there are any then,
-    and the opened one after it. Each has a path from rest: the tissue has no memory. Raises StudyError."""
+    """The scene on one of its nested meshes with its checkpoints, those between the same cuts together: on the body
+    opened along the cuts that are made by then. Each has a path from rest: the tissue has no memory. Raises StudyError.
+    """
     scene, after = mesh.scene, problem_of(mesh)
-    early = tuple(t for t in scene.checkpoints if scene.cut is not None and t <= scene.cut.at)
-    if not early:
-        return [(after, scene.checkpoints, NewtonSettings())]
-    before, late = problem_on(scene, mesh.mesh, mesh.held, mesh.lumen), scene.checkpoints[len(early) :]
-    return [(before, early, NewtonSettings()), (after, late, NewtonSettings())]
+    made = [sum(cut.at < t for cut in scene.cuts) for t in scene.checkpoints]
+    work = list[Work]()
+    for count in dict.fromkeys(made):
+        times = tuple(t for t, before in zip(scene.checkpoints, made, strict=True) if before == count)
+        problem = after
+        if count < len(scene.cuts):
+            opened, parent = mesh.opened_until(times[0])
+            problem = problem_on(scene, opened, mesh.held_in(parent), mesh.lumen)
+        work.append((problem, times, NewtonSettings()))
+    return work
 
 
-def in_last_mesh(mesh: NestedMesh, found: Sequence[Equilibrium]) -> list[Equilibrium]:
+def in_last_mesh(mesh: NestedMesh, problem: Problem, found: Sequence[Equilibrium]) -> list[Equilibrium]:
     """Equilibria of one of its problems by the nodes of the mesh that is solved last: copies of a node are together
-    until the cut."""
-    parent, vertices = mesh.parent, mesh.parent[: mesh.solved.nvertices]
-    return [one if len(one.u) == len(parent) else replace(one, u=one.u[parent], p=one.p[vertices]) for one in found]
+    until a cut parts them."""
+    if problem.mesh is mesh.solved:
+        return list(found)
+    node = parents(element_nodes(problem.mesh), element_nodes(mesh.solved))
+    vertices = node[: mesh.solved.nvertices]
+    return [replace(one, u=one.u[node], p=one.p[vertices]) for one in found]
 
 
 def targets(first: int, most: float) -> list[float]:

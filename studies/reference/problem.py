@@ -43,7 +43,7 @@ def problem_on(scene: Scene, mesh: MeshTet2, patches: list[np.ndarray], lumen: n
         gravity=scene.gravity,
         density=tissue.density,
         cavities=(_cavity(scene, lumen),) if scene.filled else (),
-        faces_touch=scene.cut is not None and scene.cut.contact,
+        faces_touch=any(cut.contact for cut in scene.cuts),
     )
 
 

@@ -100,7 +100,7 @@ def sample_of(
     if scene.filled:
         series["lumen_pressure"][-len(found) :] = [float(e.cavity_pressure.sum()) for e in found]
     # Vertices come first in all meshes of a family; a place on a cut has two sides, and only numbers tell them apart.
-    if scene.cut is not None or np.array_equal(nodes(problem.mesh)[: len(at.points)], at.points):
+    if scene.cuts or np.array_equal(nodes(problem.mesh)[: len(at.points)], at.points):
         moved = np.array([e.u[: len(at.points)] for e in found])
     else:
         columns = np.concatenate([e.u for e in found], axis=1)  # one field of 3 k components
@@ -110,7 +110,7 @@ def sample_of(
     if allowed(scene, "frequency") and len(found) == len(scene.checkpoints):
         frequency = ringing_frequency(scene, np.array(scene.checkpoints), at.points, moved, at.areas)
     unknowns = 3 * len(nodes(problem.mesh)) + problem.mesh.nvertices
-    behind, front = parted(problem.mesh.p.T, len(at.points)).T if scene.cut is not None else NO_PAIRS.T
+    behind, front = parted(problem.mesh.p.T, len(at.points)).T if scene.cuts else NO_PAIRS.T
     opening = found[-1].u[front] - found[-1].u[behind]
     return Sample(variant, unknowns, size, moved[-1], **series, frequency=frequency, opening=opening)
 

@@ -11,6 +11,7 @@ from scipy.spatial import KDTree
 from skfem import MeshTet2
 
 from reference_fem import Evaluator, facet_nodes, surface_triangles
+from studies.scene.cut import nearest_cut, normals_at, sides_of
 from studies.scene.scene import Scene
 from studies.store.record import Record
 
@@ -86,14 +87,15 @@ class Solution:
         return (2.0 if self.scene.symmetric else 1.0) * float(np.linalg.norm(np.ptp(self.field("nodes"), axis=0)))
 
     @cached_property
-    def _evaluators(self) -> list[Evaluator]:
-        """One for the whole body; of a body that is cut one for what is behind the plane and one for what is in front:
-        a place on the cut is in both, and next to its mouth the nearest element may be of the wrong one."""
-        cut, sides = self.scene.cut, [None]
-        if cut is not None:
-            middles = self.field("nodes")[self.field("tetrahedra")[:, :4]].mean(axis=1)
-            sides = [cut.plane.level(middles) <= 0, cut.plane.level(middles) > 0]
-        return [self._evaluator(among) for among in sides]
+    def _evaluators(self) -> dict[int, Evaluator]:
+        """One for the whole body; of a body that is cut one for what is behind the plane and one for what is in front,
+        or for each part between the planes of several: a place on a cut is in two, and next to its mouth the nearest
+        element may be of the wrong one."""
+        if not self.scene.cuts:
+            return {0: self._evaluator(None)}
+        middles = self.field("nodes")[self.field("tetrahedra")[:, :4]].mean(axis=1)
+        side = sides_of(self.scene.cuts, middles)
+        return {int(one): self._evaluator(side == one) for one in np.unique(side)}
 
     def _evaluator(self, among: np.ndarray | None) -> Evaluator:
         part = b"" if among is None else among.tobytes()
@@ -116,12 +118,12 @@ class Solution:
         return self._mirrored(self.field("displacement")[[checkpoint]], points)[0]
 
     def opening(self, points: np.ndarray) -> np.ndarray:
-        """Displacement in front of the scene's cut less that behind it at the last checkpoint [m], (m, 3), at
-        `points` (m, 3) [m] of it."""
-        assert self.scene.cut is not None  # there is one
-        normal = np.asarray(self.scene.cut.plane.normal, float)
-        step = BESIDE * self.size * normal / np.linalg.norm(normal)
-        points = points - np.outer(self.scene.cut.plane.level(points), normal / np.linalg.norm(normal))
+        """Displacement in front of the nearest of the scene's cuts less that behind it at the last checkpoint [m],
+        (m, 3), at `points` (m, 3) [m] of it."""
+        cuts = self.scene.cuts
+        normal, level = normals_at(cuts, points), np.array([cut.plane.level(points) for cut in cuts])
+        step = BESIDE * self.size * normal
+        points = points - normal * level[nearest_cut(cuts, points), np.arange(len(points)), None]
         return self.displacement(points + step) - self.displacement(points - step)
 
     def displacements(self, points: np.ndarray) -> np.ndarray:
@@ -134,11 +136,11 @@ class Solution:
         count, nodes, _ = nodal.shape
         # One field of 3 k components: the evaluator takes any number of them.
         columns = nodal.transpose(1, 0, 2).reshape(nodes, 3 * count)
-        found, cut = np.empty((len(points), 3 * count)), self.scene.cut
-        chosen = [slice(None)] if cut is None else [cut.plane.level(points) <= 0, cut.plane.level(points) > 0]
-        for evaluator, some in zip(self._evaluators, chosen, strict=True):
-            if len(points[some]):
-                found[some] = evaluator.displacement(columns, (sign * points)[some])
+        found, side = np.empty((len(points), 3 * count)), sides_of(self.scene.cuts, points)
+        for one in np.unique(side):
+            # Where no element is, planes meet outside of the body.
+            evaluator = self._evaluators.get(int(one)) or self._evaluator(None)
+            found[side == one] = evaluator.displacement(columns, (sign * points)[side == one])
         return sign * found.reshape(len(points), count, 3).transpose(1, 0, 2)
 
     def outside(self, triangles: np.ndarray) -> np.ndarray:

@@ -1,5 +1,6 @@
 """The body of a scene after its cut, and the event that brings it into a run."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -45,19 +46,25 @@ def pieces_of(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
     return np.unique(label, return_inverse=True)[1]
 
 
-def check_blade(cut: Cut, scene: str, kind: str) -> None:
-    """Raises DoesNotApply where the cut of the scene of that name ends inside a body of a `kind` that is a surface, or
-    advances over it."""
-    if kind == "surface" and cut.until is not None:
-        raise DoesNotApply(
-            f"the surface body does not apply to scene '{scene}': cut '{cut.name}' advances, and this body is cut in "
-            "pieces at once; leave until out, or take a tetrahedral body"
-        )
-    if kind == "surface" and cut.within is not None:
-        raise DoesNotApply(
-            f"the surface body does not apply to scene '{scene}': cut '{cut.name}' ends inside the organ, where this "
-            "body has no tissue; cut the whole section (within=None), or take a tetrahedral body"
-        )
+def check_blades(scene: Scene, kind: str) -> None:
+    """Raises DoesNotApply where a cut of the scene ends inside a body of a `kind` that is a surface, or advances over
+    it, and where there are several."""
+    words = f"the surface body does not apply to scene '{scene.name}'"
+    for cut in scene.cuts if kind == "surface" else ():
+        if cut.until is not None:
+            raise DoesNotApply(
+                f"{words}: cut '{cut.name}' advances, and this body is cut in pieces at once; leave until out, or take "
+                "a tetrahedral body"
+            )
+        if cut.within is not None:
+            raise DoesNotApply(
+                f"{words}: cut '{cut.name}' ends inside the organ, where this body has no tissue; cut the whole "
+                "section (within=None), or take a tetrahedral body"
+            )
+        if len(scene.cuts) > 1:
+            raise DoesNotApply(
+                f"{words}: it has {len(scene.cuts)} cuts, and this body is cut once; take a tetrahedral body"
+            )
 
 
 def surface_pieces(body: Body, later: Opened, axis: str) -> Pieces:
@@ -84,28 +91,30 @@ def keeping_pieces(body: Body, volumes: Volumes | PointVolumes | None) -> Body:
 
 def check_opens(scene: Scene, recipe: BodyRecipe) -> None:
     """Raises StudyError for a body whose lumen no cut opens."""
-    if scene.cut is None or not scene.cut.opens_lumen:
+    cut = next((cut for cut in scene.cuts if cut.opens_lumen), None)
+    if cut is None:
         return
     if recipe.kind != "tetrahedral" or recipe.graded:
         kind = "graded" if recipe.graded else recipe.kind
         raise StudyError(
-            f"cut '{scene.cut.name}' opens a lumen, which a {kind} body cannot do yet; take an even tetrahedral one"
+            f"cut '{cut.name}' opens a lumen, which a {kind} body cannot do yet; take an even tetrahedral one"
         )
     if scene.filled and recipe.volumes == "whole":
         raise StudyError(
-            f"cut '{scene.cut.name}' opens a lumen, and the body keeps wall and content as one volume; keep them "
+            f"cut '{cut.name}' opens a lumen, and the body keeps wall and content as one volume; keep them "
             'apart: volumes="scene" or "nodal"'
         )
 
 
-def check_held(cut: Cut, body: Body, attachments: tuple[Attachment, ...]) -> None:
-    """Raises StudyError for a piece of the cut body that nothing holds, unless it may go."""
+def check_held(cuts: Sequence[Cut], body: Body, attachments: tuple[Attachment, ...]) -> None:
+    """Raises StudyError for a piece of the cut body that nothing holds, unless one of the cuts lets it go."""
     cells, points = (body.tetrahedra if len(body.tetrahedra) else body.triangles).astype(np.int64), body.rest
     held = np.concatenate([np.empty(0, np.int64), *(np.asarray(a.nodes) for a in attachments)])
     piece = pieces_of(points, cells)
     loose = [k for k in range(piece.max() + 1) if not np.isin(cells[piece == k], held).any()]
-    if loose and not cut.free:
-        raise StudyError(f"cut '{cut.name}' leaves a piece that nothing holds; hold it, or let it go: free=True")
+    if loose and not any(cut.free for cut in cuts):
+        names = "' or '".join(cut.name for cut in cuts)
+        raise StudyError(f"cut '{names}' leaves a piece that nothing holds; hold it, or let it go: free=True")
 
 
 def event_of(
@@ -141,6 +150,11 @@ def event_of(
 
 def check_virtual(scene: Scene) -> None:
     """Raises DoesNotApply for a scene in which there is nothing that virtual nodes could cut."""
+    if len(scene.cuts) > 1:
+        raise DoesNotApply(
+            f"virtual nodes do not apply to scene '{scene.name}', which has {len(scene.cuts)} cuts; take cut "
+            "'conforming'"
+        )
     if scene.cut is None:
         raise DoesNotApply(f"virtual nodes do not apply to scene '{scene.name}': it has no cut; leave cut out")
     if scene.cut.until is not None:

@@ -36,7 +36,7 @@ from studies.runs.case import ADAPTER, ADAPTIVE, VIRTUAL, BodyRecipe, Case
 from studies.runs.cutting import (
     LUMEN,
     Opening,
-    check_blade,
+    check_blades,
     check_held,
     check_opens,
     check_virtual,
@@ -49,7 +49,6 @@ from studies.runs.limits import check_size
 from studies.runs.quadratic import check_masses, flat_mesh, quadratic_for
 from studies.runs.user_code import own_laws, sprung_by
 from studies.scene.clock import event_frames
-from studies.scene.cut import Cut
 from studies.scene.scene import Scene
 
 WHOLE = "whole"
@@ -90,7 +89,7 @@ def mesh_of(scene: Scene, recipe: BodyRecipe) -> OrganMesh | QuadraticMesh:
         return graded_mesh(scene, recipe.nodes, *(usual_grading(scene) if recipe.graded else (0, 0)), quadratic)
     # The paper's body of a hollow organ is its outer surface; what its content is, only the wall tells. A cut is meshed
     # with the tissue on either side.
-    inside = scene.lumen is not None or scene.cut is not None
+    inside = scene.lumen is not None or bool(scene.cuts)
     return mesh_for(scene, recipe.nodes, filled=recipe.kind == "tetrahedral" or inside)
 
 
@@ -120,7 +119,7 @@ def body_for(
     if recipe.stiffness != 1.0:
         body = body.stiffened(recipe.stiffness)
     volumes = volumes_for(scene, recipe, mesh, body)
-    if scene.cut is not None:
+    if scene.cuts:
         return keeping_pieces(body, volumes)
     return body if volumes is None else body.keeping(volumes)
 
@@ -181,7 +180,7 @@ def check_applies(case: Case, body: Body, targets: bool) -> None:
     if reason is not None:
         raise DoesNotApply(f"method '{method.name}' does not apply to the {case.body.kind} body: {reason}")
     touching = method.capabilities.face_contact
-    if scene.cut is not None and scene.cut.contact and isinstance(touching, No):
+    if any(cut.contact for cut in scene.cuts) and isinstance(touching, No):
         raise DoesNotApply(
             f"method '{method.name}' does not apply to scene '{scene.name}', whose faces of the cut touch: "
             f"{touching.because}; take implicit_volume"
@@ -200,8 +199,7 @@ def prepare(case: Case) -> Prepared:
         raise DoesNotApply(f"method '{case.method.name}' does not apply to scene '{scene.name}': {reason}")
     check_masses(scene, case.body)
     check_opens(scene, case.body)
-    if scene.cut is not None:
-        check_blade(scene.cut, scene.name, case.body.kind)
+    check_blades(scene, case.body.kind)
     mesh = mesh_of(scene, case.body)
     from studies.meshing.kept_shape import tell_shape  # with the finite elements
 
@@ -222,8 +220,8 @@ def prepared_on(case: Case, mesh: OrganMesh | QuadraticMesh) -> Prepared:
         mesh = mesh.outer()
     attachments, last, frames = attachments_for(scene, mesh), body, case.frames or scene.frames
     events, opening, limit_before, tissue = (), None, None, None
-    if scene.cut is not None:
-        events, opening, mesh, tissue = cut_of(case, scene.cut, given, body, bool(targets))
+    if scene.cuts:
+        events, opening, mesh, tissue = cut_of(case, given, body, bool(targets))
         last, limit_before = events[-1].body, limit_of(case, body, attachments)
     limit = limit_of(case, last, events[-1].attachments if events else attachments)
     dt = case.dt_fraction * limit.damped if case.dt == "auto" else float(case.dt)
@@ -248,14 +246,15 @@ def prepared_on(case: Case, mesh: OrganMesh | QuadraticMesh) -> Prepared:
 
 
 def cut_of(
-    case: Case, cut: Cut, mesh: OrganMesh | QuadraticMesh, body: Body, targets: bool
+    case: Case, mesh: OrganMesh | QuadraticMesh, body: Body, targets: bool
 ) -> tuple[tuple[Event, ...], Opening, OrganMesh, Tissue | None]:
-    """The events at which the cut opens a body on its mesh, where it was cut in the end, the mesh then, and of a body
+    """The events at which the cuts open a body on its mesh, where it was cut in the end, the mesh then, and of a body
     with virtual nodes its tissue. Raises StudyError, MassSpringError."""
     scene, recipe = case.scene, case.body
-    frames = event_frames(scene, cut, case.frames or scene.frames)
-    shares = [(frame - frames[0]) / max(1, frames[-1] - frames[0]) for frame in frames]
-    stages = _stages(recipe, mesh, cut, shares)
+    ways = [event_frames(scene, cut, case.frames or scene.frames) for cut in scene.cuts]
+    frames = sorted(set().union(*ways))
+    shares = np.array([[_share(frame, way[0], way[-1]) for way in ways] for frame in frames])
+    stages = _stages(scene, recipe, mesh, shares)
     events, last, cells = [], body, cells_of(mesh)
     for frame, stage in zip(frames, stages, strict=True):
         if stage is None:
@@ -273,23 +272,28 @@ def cut_of(
             parent, flat = parents(cells, cells_of(stage.mesh)), flat_mesh(stage.mesh, last)
             cells = cells_of(stage.mesh)
         check_applies(case, last, targets)
-        touching = stage.pairs if cut.contact else None
+        touching = stage.pairs if scene.cuts[0].contact else None  # all touch, or none
         events.append(event_of(frame, before, last, parent, attachments_for(scene, flat), touching, growth))
-    check_held(cut, last, events[-1].attachments)
+    check_held(scene.cuts, last, events[-1].attachments)
     whole = next(stage for stage in reversed(stages) if stage is not None)
     tissue = whole.tissue if isinstance(whole, VirtualMesh) else None
     flat, surface = (flat, last.triangles) if tissue is None else (tissue.mesh, tissue.mesh.triangles)
     return tuple(events), opening_of(events[0].frame, last, surface, whole.pairs), flat, tissue
 
 
+def _share(frame: int, first: int, last: int) -> float:
+    """Of the way of a cut after so many frames, −1 before its first event."""
+    return -1.0 if frame < first else 1.0 if frame >= last else (frame - first) / (last - first)
+
+
 def _stages(
-    recipe: BodyRecipe, mesh: OrganMesh | QuadraticMesh, cut: Cut, shares: Sequence[float]
+    scene: Scene, recipe: BodyRecipe, mesh: OrganMesh | QuadraticMesh, shares: np.ndarray
 ) -> Sequence[Opened | VirtualMesh | None]:
     """The mesh at each event, along its faces or through its cells. Raises StudyError."""
     if recipe.cut == VIRTUAL:
         assert isinstance(mesh, OrganMesh)  # of a tetrahedral body
-        return [virtual_mesh(mesh, cut)]
-    return opened_in_stages(mesh, cut, shares)
+        return [virtual_mesh(mesh, scene.cuts[0])]  # check_virtual has seen that it is the only one
+    return opened_in_stages(mesh, scene.cuts, shares)
 
 
 def limit_of(case: Case, body: Body, attachments: tuple[Attachment, ...]) -> StepLimit:

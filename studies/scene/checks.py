@@ -16,7 +16,7 @@ from studies.geometry.organs import SHAPES
 from studies.geometry.organs.make_shape import make_shape
 from studies.geometry.surface.first_surface import first_surface
 from studies.scene.clock import check_clock, is_number
-from studies.scene.cut_checks import check_cut, check_cuttable
+from studies.scene.cut_checks import check_cuts, check_cuttable
 from studies.scene.kind import has_wall
 from studies.scene.organ_file import scanned
 from studies.scene.scene import Organ, Scene
@@ -47,9 +47,9 @@ def check_scene(scene: Scene) -> list[str]:
         *_unusual(scene, "duration", scene.duration, DURATION, "s"),
     ]
     _check_organ(scene)
-    if scene.cut is not None:
-        check_cuttable(scene, scene.cut)
-    if not scene.obstacles and not scene.held and scene.cut is None:
+    for cut in scene.cuts:
+        check_cuttable(scene, cut)
+    if not scene.obstacles and not scene.held and not scene.cuts:
         return found
     try:
         points, triangles = surface_of(scene.organ, scene.name)
@@ -67,8 +67,7 @@ def check_scene(scene: Scene) -> list[str]:
     for held in scene.held:
         found += _too_large(scene, f"the path of region '{held.name}'", _reach(held.path), size)
         _check_region(scene, held.name, held.region.level(points), points, triangles)
-    if scene.cut is not None:
-        check_cut(scene, scene.cut, (points, triangles))
+    check_cuts(scene, (points, triangles))
     return found
 
 

@@ -59,22 +59,23 @@ def event_frames(scene: Scene, cut: Cut, frames: int) -> list[int]:
 
 
 def check_judged_after_cut(scene: Scene) -> None:
-    """Raises StudyError where all checkpoints of a reference come before the cut of its scene, or one while it
+    """Raises StudyError where all checkpoints of a reference come before a cut of its scene, or one while it
     advances."""
-    cut, last = scene.cut, scene.checkpoints[-1]
-    if cut is None or scene.reference is None:
+    if scene.reference is None:
         return
-    if last <= cut.at:
-        raise StudyError(
-            f"scene '{scene.name}' has its last checkpoint at {last:g} s and its cut at {cut.at:g} s, so nothing "
-            "would judge what is cut; move one of them"
-        )
-    during = [t for t in scene.checkpoints if cut.at < t <= cut.ends]
-    if during:
-        raise StudyError(
-            f"scene '{scene.name}' has a checkpoint at {during[0]:g} s, and cut '{cut.name}' advances from {cut.at:g} "
-            f"to {cut.ends:g} s; the reference knows the body whole and cut, so judge it before or after"
-        )
+    last = scene.checkpoints[-1]
+    for cut in scene.cuts:
+        if last <= cut.at:
+            raise StudyError(
+                f"scene '{scene.name}' has its last checkpoint at {last:g} s and its cut at {cut.at:g} s, so nothing "
+                "would judge what is cut; move one of them"
+            )
+        during = [t for t in scene.checkpoints if cut.at < t <= cut.ends]
+        if during:
+            raise StudyError(
+                f"scene '{scene.name}' has a checkpoint at {during[0]:g} s, and cut '{cut.name}' advances from "
+                f"{cut.at:g} to {cut.ends:g} s; the reference knows the body whole and cut, so judge it before or after"
+            )
 
 
 def is_number(value: object) -> bool:

@@ -1,6 +1,7 @@
 """Where and when an organ is cut: a sheet in its rest configuration, the same material for every solver."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -61,6 +62,11 @@ class Cut:
             )
 
     @property
+    def unit_normal(self) -> np.ndarray:
+        """Of its plane, from behind it to its front, (3,)."""
+        return np.asarray(self.plane.normal, float) / np.linalg.norm(self.plane.normal)
+
+    @property
     def ends(self) -> float:
         """When all of it is open [s]."""
         return self.at if self.until is None else self.until
@@ -69,3 +75,22 @@ class Cut:
     def at_once(self) -> "Cut":
         """The same sheet opened at one instant: where it comes to rest does not depend on how the cut advances."""
         return replace(self, until=None, along=None)
+
+
+def sides_of(cuts: Sequence[Cut], points: np.ndarray) -> np.ndarray:
+    """On which side of each plane the points (n, 3) [m] lie, (n,): a number for each choice, 0 behind all of them."""
+    return sum((2**k * (cut.plane.level(points) > 0) for k, cut in enumerate(cuts)), np.zeros(len(points), np.int64))
+
+
+def nearest_cut(cuts: Sequence[Cut], points: np.ndarray) -> np.ndarray:
+    """The number of the cut whose blade is nearest to each of the points (n, 3) [m], (n,)."""
+    distance = [
+        np.hypot(cut.plane.level(points), 0.0 if cut.within is None else np.maximum(0.0, cut.within.level(points)))
+        for cut in cuts
+    ]
+    return np.argmin(distance, axis=0)
+
+
+def normals_at(cuts: Sequence[Cut], points: np.ndarray) -> np.ndarray:
+    """The unit normal of the nearest cut at the points (n, 3) [m], (n, 3)."""
+    return np.array([cut.unit_normal for cut in cuts])[nearest_cut(cuts, points)]

@@ -16,6 +16,6 @@ def allowed(scene: Scene, quantity: str) -> bool:
     if word == "lumen" and not scene.filled:
         return False
     if word == "opening":
-        return scene.cut is not None
+        return bool(scene.cuts)
     moves = scene.reference is not None and scene.reference.dt is not None
     return word in ALWAYS or word in scene.quantities or (word in GAUGE_FREE and not moves)

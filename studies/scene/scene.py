@@ -170,13 +170,15 @@ class Scene:
     start: InitialConditions | None = None
     """None: at rest."""
     cuts: tuple[Cut, ...] = ()
-    """One at most."""
+    """Their sections do not meet in the organ."""
     not_for: tuple[tuple[str, str], ...] = ()
     """(method, reason): combinations that make no sense."""
 
     def __post_init__(self) -> None:
-        if len(self.cuts) > 1:
-            raise StudyError(f"scene '{self.name}' has {len(self.cuts)} cuts; a body is cut once in a scene so far")
+        names = [cut.name for cut in self.cuts]
+        twice = sorted({name for name in names if names.count(name) > 1})
+        if twice:
+            raise StudyError(f"scene '{self.name}' has two cuts called '{twice[0]}'; give each its own name")
         if self.cuts and self.reference is not None and not self.reference.nested:
             raise StudyError(
                 f"scene '{self.name}' is cut, and its reference is of an octant or a motion, which are not cut; "
@@ -185,7 +187,11 @@ class Scene:
 
     @property
     def cut(self) -> Cut | None:
-        """The cut of the scene, if it has one."""
+        """The cut of the scene, if it has one. Raises StudyError for several, which `cuts` has."""
+        if len(self.cuts) > 1:
+            raise StudyError(
+                f"scene '{self.name}' has {len(self.cuts)} cuts, and one at most is known here; leave the others out"
+            )
         return self.cuts[0] if self.cuts else None
 
     def skip(self, method: str) -> str | None:

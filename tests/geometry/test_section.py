@@ -48,7 +48,7 @@ def euler(triangles: np.ndarray) -> int:
     ],
 )
 def test_a_cut_lies_on_faces_along_which_the_mesh_opens(name, cut, euler_after, pieces):
-    mesh = organ(name, 350, {}, cut=cut)
+    mesh = organ(name, 350, {}, cuts=(cut,))
     check_tetrahedra(mesh.points, mesh.tetrahedra, mesh.name)
     assert same_triangles(boundary_triangles(mesh.tetrahedra), mesh.triangles)
     assert dihedral_angles(mesh.points, mesh.tetrahedra).min() > 10.0
@@ -70,7 +70,7 @@ def test_a_cut_lies_on_faces_along_which_the_mesh_opens(name, cut, euler_after, 
 
 def test_the_front_is_exactly_on_the_edge_of_the_blade_and_the_area_is_that_of_the_section():
     for within, area in ((None, np.pi * 0.05**2), (HALF, 0.5 * np.pi * 0.05**2), (DISC, np.pi * 0.02**2)):
-        mesh = organ("ball", 350, {}, cut=Cut(within=within))
+        mesh = organ("ball", 350, {}, cuts=(Cut(within=within),))
         faces = mesh.cuts["cut"]
         assert triangle_areas(mesh.points, faces).sum() == pytest.approx(area, rel=0.03)
         if within is not None:
@@ -87,7 +87,7 @@ def test_the_front_is_exactly_on_the_edge_of_the_blade_and_the_area_is_that_of_t
 def test_random_sections_of_organs(seed):
     random = np.random.default_rng(seed)
     normal = random.standard_normal(3)
-    mesh = organ(("ball", "liver", "kidney")[seed % 3], 350, {}, cut=Cut(HalfSpace((0.0, 0.0, 0.0), tuple(normal))))
+    mesh = organ(("ball", "liver", "kidney")[seed % 3], 350, {}, cuts=(Cut(HalfSpace((0.0, 0.0, 0.0), tuple(normal))),))
     opening = opened(mesh.tetrahedra, mesh.cuts["cut"], len(mesh.points))
     assert len(opening.pairs) > 30
     assert tetrahedron_volumes(mesh.points, mesh.tetrahedra).sum() == pytest.approx(mesh.volume, rel=1e-12, abs=0)
@@ -96,7 +96,7 @@ def test_random_sections_of_organs(seed):
 def test_a_triangle_of_the_surface_that_lies_in_the_plane_belongs_to_the_body_next_to_it():
     """Three nodes of the trace make one here; counted to the other side, it lies on a face of the section."""
     plane = HalfSpace((0.00403777, 0.00666823, 0.00125052), (-0.51142751, -0.84460292, -0.15839131))
-    mesh = organ("liver", 350, {}, cut=Cut(plane))
+    mesh = organ("liver", 350, {}, cuts=(Cut(plane),))
     on = np.abs(plane.level(mesh.points)) < 1e-9
     assert on[mesh.triangles].all(axis=1).any()
     assert len(opened(mesh.tetrahedra, mesh.cuts["cut"], len(mesh.points)).pairs) > 30
@@ -117,12 +117,12 @@ def test_a_triangle_of_the_surface_that_lies_in_the_plane_belongs_to_the_body_ne
 )
 def test_cuts_that_cannot_be_are_refused(cut, regions, sentence):
     with pytest.raises(StudyError, match=sentence):
-        organ("ball", 350, regions, cut=cut)
+        organ("ball", 350, regions, cuts=(cut,))
 
 
 def test_bare_surfaces_are_not_cut_yet():
     with pytest.raises(StudyError, match="is for an organ that is filled; surfaces are not cut yet"):
-        organ("ball", 400, {}, False, cut=Cut())
+        organ("ball", 400, {}, False, cuts=(Cut(),))
 
 
 def test_loops_follow_their_edges():

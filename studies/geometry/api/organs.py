@@ -53,7 +53,7 @@ def organ(
     layers: int | None = None,
     exact: bool = False,
     sides: str | None = None,
-    cut: "PlaneCut | None" = None,
+    cuts: Sequence[PlaneCut] = (),
 ) -> OrganMesh:
     """The organ `name` of SHAPES with `nodes` nodes on its outer surface (exactly or within 2 %).
 
@@ -61,8 +61,8 @@ def organ(
     lumen, in `layers` of prisms (None: as many as make them as high as long); with fill=False only the outer surface
     is made. exact: flat sides enclose exactly the organ's volume, so nodes are a little off its surface, outlines on
     theirs; else the nodes are on it and the volume is 1 to 12 % too small. sides: "straight" or "curved", those that
-    are to follow the organ's shape, for which nodes go where it needs them; None: nodes are evenly spread. cut: lies on
-    faces of the filled mesh, which stays whole. Raises StudyError when the mesher cannot.
+    are to follow the organ's shape, for which nodes go where it needs them; None: nodes are evenly spread. cuts: lie on
+    faces of the filled mesh, which stays whole; their sections do not meet. Raises StudyError when the mesher cannot.
     """
     if isinstance(nodes, bool) or not isinstance(nodes, int | np.integer):
         raise StudyError(f"{name}: {nodes!r} surface nodes asked for; give a whole number such as 550")
@@ -79,11 +79,13 @@ def organ(
         "regions": {key: region_to_dict(region) for key, region in own.items()},
         "fill": bool(fill),
     } | ({"exact": True} if exact else {})
-    if cut is not None:
-        if not fill:
-            raise StudyError(f"{name}: cut {cut.name!r} is for an organ that is filled; surfaces are not cut yet")
-        within = None if cut.within is None else region_to_dict(cut.within)
-        recipe["cut"] = {"name": cut.name, "plane": region_to_dict(cut.plane), "within": within}
+    if cuts and not fill:
+        raise StudyError(f"{name}: cut {cuts[0].name!r} is for an organ that is filled; surfaces are not cut yet")
+    sheets = [
+        {"name": cut.name, "plane": region_to_dict(cut.plane), "within": cut.within and region_to_dict(cut.within)}
+        for cut in cuts
+    ]
+    recipe |= {"cut": sheets[0]} if len(sheets) == 1 else {"cuts": sheets} if sheets else {}
     recipe |= {} if sides is None else {"sides": lookup(sides, SIDES, "kind of sides")}
     if layers is not None:
         if shape.wall is None:

@@ -51,8 +51,14 @@ def mesh_from(
     """
     given = arrays or {}
     parts = (*PARTS, "losses") if recipe["kind"] == "scan" else PARTS
-    parts = (*parts, "cut_faces") if "cut" in recipe else parts
+    parts = (*parts, *cuts_of(recipe))
     return to_mesh(recipe, cached(recipe, given, parts, lambda: run_worker(recipe, given, limit)))
+
+
+def cuts_of(recipe: dict[str, Any]) -> dict[str, dict[str, Any]]:
+    """The cuts of a recipe, by the name that the array of their faces has among its parts."""
+    cuts = recipe.get("cuts", [recipe["cut"]] if "cut" in recipe else [])
+    return {f"cut_faces{k or ''}": cut for k, cut in enumerate(cuts)}
 
 
 def level_of(recipe: dict[str, Any], arrays: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
@@ -83,8 +89,7 @@ def to_mesh(recipe: dict[str, Any], arrays: dict[str, np.ndarray]) -> OrganMesh:
     losses = json.loads(str(arrays["losses"])) if "losses" in arrays else {}
     points = arrays["points"]
     mesh = OrganMesh(recipe["name"], points, *cells, count, recipe=recipe, outer_count=outer, losses=losses)
-    if "cut" in recipe:
-        mesh = replace(mesh, cuts={recipe["cut"]["name"]: arrays["cut_faces"]})
+    mesh = replace(mesh, cuts={cut["name"]: arrays[part] for part, cut in cuts_of(recipe).items()})
     return replace(mesh, patches=patches_of(mesh, recipe.get("regions", {})))
 
 

@@ -9,10 +9,11 @@ from studies.base.errors import StudyError
 from studies.geometry.mesh.checks import check_surface
 from studies.geometry.mesh.wall_layers import fill_wall
 from studies.geometry.mesher.fill import fill_surface
+from studies.geometry.mesher.jobs import cuts_of
 from studies.geometry.mesher.octant import build_octant
 from studies.geometry.mesher.organ_surface import close_surface, even_surface
 from studies.geometry.mesher.progress import stage
-from studies.geometry.mesher.section import check_clear, cut_wall, fill_cut, planes_of, with_front
+from studies.geometry.mesher.section import check_clear, cut_wall, fill_cut, plane_of, with_front
 from studies.geometry.mesher.worker import Arrays, work
 from studies.geometry.organs.make_shape import make_shape
 from studies.geometry.shape.levelset import Shape, at_depth
@@ -41,17 +42,17 @@ def mesh_shape(shape: Shape, recipe: dict[str, Any]) -> Arrays:
     sides: "straight" or "curved", those that are to follow the shape; without, nodes are evenly spread.
     """
     held = [region_from_dict(data) for data in recipe["regions"].values()]
-    regions = held + planes_of(recipe)
-    if "cut" in recipe:
-        check_clear(shape, recipe["cut"], held)
+    cuts = cuts_of(recipe)
+    regions = held + [plane_of(cut) for cut in cuts.values()]
+    check_clear(shape, list(cuts.values()), held, recipe["nodes"])
     if "sides" in recipe:
         points, triangles = close_surface(shape, recipe["nodes"], regions, recipe["sides"] == "curved")
     else:
         points, triangles = even_surface(shape, recipe["nodes"], regions)
     if has_exact_volume(recipe):
         points = with_volume(points, triangles, enclosed_volume(shape, 2), shape.level, regions)
-    if "cut" in recipe:
-        points, triangles = with_front(shape, (points, triangles), recipe["cut"])
+    for cut in cuts.values():
+        points, triangles = with_front(shape, (points, triangles), cut)
     return finish(shape, points, triangles, recipe)
 
 
@@ -61,17 +62,18 @@ def finish(shape: Shape, points: np.ndarray, triangles: np.ndarray, recipe: dict
     stage("filling")
     if not recipe["fill"]:
         return arrays_of(points, triangles, np.empty((0, 4), np.int64), len(points), len(points))
+    cuts = cuts_of(recipe)
     if shape.wall is not None:
         made = fill_wall(shape, points, triangles, recipe.get("layers"))
         all_points = with_lumen_volume(shape, made[0], triangles) if has_exact_volume(recipe) else made[0]
         faces = {}
-        if "cut" in recipe:
-            all_points, faces["cut_faces"] = cut_wall(shape, all_points, triangles, made[2], recipe["cut"])
+        for part, cut in cuts.items():
+            all_points, faces[part] = cut_wall(shape, all_points, triangles, made[2], cut)
         return arrays_of(all_points, *made[1:], 2 * len(points), len(points)) | faces
-    if "cut" in recipe:
-        all_points, tetrahedra, faces = fill_cut(shape, (points, triangles), recipe["cut"])
+    if cuts:
+        all_points, tetrahedra, faces = fill_cut(shape, (points, triangles), list(cuts.values()))
         made = arrays_of(all_points, triangles, tetrahedra, len(points), len(points))
-        return made | {"cut_faces": faces}
+        return made | dict(zip(cuts, faces, strict=True))
     all_points, tetrahedra = fill_surface(points, triangles, strict=recipe["kind"] != "scan")
     return arrays_of(all_points, triangles, tetrahedra, len(points), len(points))
 

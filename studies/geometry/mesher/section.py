@@ -1,6 +1,6 @@
-"""A surface filled on either side of a plane, the section meshed in the plane: the blade of a cut lies on faces."""
+"""A surface filled on either side of planes, the sections meshed in them: the blades of cuts lie on faces."""
 
-from itertools import pairwise
+from itertools import pairwise, product
 from typing import Any
 
 import gmsh
@@ -13,6 +13,7 @@ from studies.geometry.mesh.organ_mesh import (
     signed_volume,
     tetrahedron_facets,
     tetrahedron_volumes,
+    triangle_areas,
     triangle_normals,
 )
 from studies.geometry.mesh.quality import MIN_WALL_RATIO, tetrahedron_radius_ratio
@@ -21,7 +22,7 @@ from studies.geometry.mesher.gmsh_calls import TRIANGLE, fresh_model
 from studies.geometry.shape.levelset import Shape, at_depth, project
 from studies.geometry.shape.regions import ON_CURVE, BallRegion, HalfSpace, Region, region_from_dict
 from studies.geometry.surface.first_surface import first_surface
-from studies.geometry.surface.sheet import LEAST_PIECE, check_sheet
+from studies.geometry.surface.sheet import LEAST_PIECE, check_apart, check_sheet
 
 ROUND = 16
 """Sides of the polygon that stands for the edge of a disc, at least: of fewer it loses more than 3 % of its area."""
@@ -32,23 +33,31 @@ FEWEST_CELLS = 30
 Surface = tuple[np.ndarray, np.ndarray]
 
 
-def planes_of(recipe: dict[str, Any]) -> list[Region]:
-    """The plane of the recipe's cut, if it has one, as a region: its outline on a surface is the trace of the cut."""
-    return [region_from_dict(recipe["cut"]["plane"])] if "cut" in recipe else []
+def check_clear(shape: Shape, cuts: list[dict[str, Any]], held: list[Region], nodes: int) -> None:
+    """Raises StudyError for cuts that no mesh of the shape can have with so many surface nodes
+    (studies.geometry.surface.sheet)."""
+    if not cuts:
+        return
+    surface, sheets = first_surface(shape), {}
+    for cut in cuts:
+        plane = plane_of(cut)
+        sheets[cut["name"]] = plane, check_sheet(shape.name, cut["name"], surface, plane, _within(cut), held)
+    edge = np.sqrt(2.0 / np.sqrt(3.0) * triangle_areas(*surface).sum() / nodes)
+    check_apart(shape.name, sheets, float(edge))
 
 
-def check_clear(shape: Shape, cut: dict[str, Any], held: list[Region]) -> None:
-    """Raises StudyError for a cut that no mesh of the shape can have (studies.geometry.surface.sheet)."""
+def plane_of(cut: dict[str, Any]) -> HalfSpace:
+    """Its plane as a region: its outline on a surface is the trace of the cut."""
     plane = region_from_dict(cut["plane"])
     assert isinstance(plane, HalfSpace)  # a cut has no other
-    check_sheet(shape.name, cut["name"], first_surface(shape), plane, _within(cut), held)
+    return plane
 
 
 def with_front(shape: Shape, surface: Surface, cut: dict[str, Any]) -> Surface:
     """The surface, whose trace of the plane lies on edges, with the nodes of the trace nearest to a straight front
     exactly on it. Raises StudyError."""
     points, triangles = surface
-    plane, within = region_from_dict(cut["plane"]), _within(cut)
+    plane, within = plane_of(cut), _within(cut)
     edges = trace(plane, points, triangles, shape.size, cut["name"])
     if within is None or isinstance(within, BallRegion):
         return surface
@@ -73,7 +82,7 @@ def _within(cut: dict[str, Any]) -> Region | None:
     return None if cut["within"] is None else region_from_dict(cut["within"])
 
 
-def trace(plane: Region, points: np.ndarray, triangles: np.ndarray, size: float, name: str) -> np.ndarray:
+def trace(plane: HalfSpace, points: np.ndarray, triangles: np.ndarray, size: float, name: str) -> np.ndarray:
     """Edges (e, 2) of a surface that lie in the plane, between triangles on either side of it. Raises StudyError."""
     on, side = _on(plane, points, size), _side(plane, points, triangles, size)
     half = triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
@@ -85,30 +94,43 @@ def trace(plane: Region, points: np.ndarray, triangles: np.ndarray, size: float,
     return edges
 
 
-def _on(plane: Region, points: np.ndarray, size: float) -> np.ndarray:
+def _on(plane: HalfSpace, points: np.ndarray, size: float) -> np.ndarray:
     return np.abs(plane.level(points)) <= 10 * ON_CURVE * size
 
 
-def _side(plane: Region, points: np.ndarray, triangles: np.ndarray, size: float) -> np.ndarray:
+def _side(plane: HalfSpace, points: np.ndarray, triangles: np.ndarray, size: float) -> np.ndarray:
     """−1 behind the plane and 1 in front of it, of each triangle; of one in the plane, that of the body next to it."""
-    assert isinstance(plane, HalfSpace)  # a cut has no other
     flat = _on(plane, points, size)[triangles].all(axis=1)
     outward = triangle_normals(points, triangles) @ np.asarray(plane.normal, float)
     return np.where(np.where(flat, outward < 0, plane.level(points[triangles].mean(axis=1)) > 0), 1, -1)
 
 
-def fill_cut(shape: Shape, surface: Surface, cut: dict[str, Any]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """All points [m], the surface's first, tetrahedra inside, and the faces of the blade (f, 3), seen anticlockwise
-    from in front of the plane. Raises StudyError."""
+def fill_cut(
+    shape: Shape, surface: Surface, cuts: list[dict[str, Any]]
+) -> tuple[np.ndarray, np.ndarray, list[np.ndarray]]:
+    """All points [m], the surface's first, tetrahedra inside, and the faces of each blade (f, 3), seen anticlockwise
+    from in front of its plane. Raises StudyError."""
     points, triangles = surface
-    plane, name = region_from_dict(cut["plane"]), f"cut {cut['name']!r}"
-    edges = trace(plane, points, triangles, shape.size, cut["name"])
-    new, faces, blade = section(plane, points, edges, _within(cut), name)
-    points = np.concatenate([points, new])
-    side = _side(plane, points, triangles, shape.size)
-    cells = np.empty((0, 4), np.int64)
-    for sign, caps in ((-1, faces), (1, faces[:, ::-1])):
-        for piece in _pieces(np.concatenate([triangles[side == sign], caps]), len(points)):
+    planes, sections, blades = [plane_of(cut) for cut in cuts], list[np.ndarray](), list[np.ndarray]()
+    for plane, cut in zip(planes, cuts, strict=True):
+        edges = trace(plane, *surface, shape.size, cut["name"])
+        new, faces, blade = section(plane, points, edges, _within(cut), f"cut {cut['name']!r}")
+        points = np.concatenate([points, new])
+        sections.append(faces)
+        blades.append(faces[blade])
+    # Every triangle bounds the body on its side of each plane; those of a section do so on both sides of their own.
+    walls, sides = [triangles], [np.stack([_side(plane, points, triangles, shape.size) for plane in planes], axis=1)]
+    for k, faces in enumerate(sections):
+        side = np.stack([_side(plane, points, faces, shape.size) for plane in planes], axis=1)
+        for sign, caps in ((-1, faces), (1, faces[:, ::-1])):
+            walls.append(caps)
+            sides.append(np.where(np.arange(len(planes)) == k, sign, side))
+    every, side, cells = np.concatenate(walls), np.concatenate(sides), np.empty((0, 4), np.int64)
+    for signs in product((-1, 1), repeat=len(planes)):
+        here = every[(side == signs).all(axis=1)]
+        for piece in _pieces(here, len(points)) if len(here) else []:
+            near = [k for k, faces in enumerate(sections) if np.isin(faces, piece).all(axis=1).any()]
+            name = f"cut {' or '.join(repr(cuts[k]['name']) for k in near)}"
             share = signed_volume(points, piece) / signed_volume(*surface)
             if not share > LEAST_PIECE:
                 raise StudyError(
@@ -118,13 +140,14 @@ def fill_cut(shape: Shape, surface: Surface, cut: dict[str, Any]) -> tuple[np.nd
             try:
                 filled, inside = fill_surface(points[used], local.reshape(-1, 3))
             except StudyError as error:
+                faces = np.concatenate([sections[k] for k in near])
                 raise StudyError(f"{shape.name}: {name} {why_not_filled(points, faces, error)}") from error
             if len(inside) < FEWEST_CELLS:
                 raise StudyError(f"{shape.name}: {name} leaves a piece of {len(inside)} tetrahedra; use more nodes")
             number = np.concatenate([used, len(points) + np.arange(len(filled) - len(used))])
             points = np.concatenate([points, filled[len(used) :]])
             cells = np.concatenate([cells, number[inside]])
-    return points, cells, faces[blade]
+    return points, cells, blades
 
 
 def cut_wall(
@@ -134,8 +157,7 @@ def cut_wall(
     studies.geometry.mesh.wall_layers, those behind the trace moved into the plane; and the faces of the blade (f, 3),
     the sides of prisms between them, seen anticlockwise from in front of the plane. Raises StudyError where that
     flattens an element."""
-    plane, within = region_from_dict(cut["plane"]), _within(cut)
-    assert isinstance(plane, HalfSpace)  # a cut has no other
+    plane, within = plane_of(cut), _within(cut)
     count = int(triangles.max()) + 1
     edges = trace(plane, points[:count], triangles, shape.size, cut["name"])
     over, points, rings = np.unique(edges), points.copy(), len(points) // count
@@ -189,11 +211,10 @@ def _pieces(triangles: np.ndarray, count: int) -> list[np.ndarray]:
 
 
 def section(
-    plane: Region, points: np.ndarray, edges: np.ndarray, within: Region | None, name: str
+    plane: HalfSpace, points: np.ndarray, edges: np.ndarray, within: Region | None, name: str
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """New points (n, 3) [m] in the plane, the triangles of its section by all points, seen from in front, and which of
     them are the blade's. Raises StudyError."""
-    assert isinstance(plane, HalfSpace)  # a cut has no other
     normal = np.asarray(plane.normal, float) / np.linalg.norm(plane.normal)
     one = np.cross(normal, np.eye(3)[np.abs(normal).argmin()])
     axes = np.stack([one / np.linalg.norm(one), np.cross(normal, one / np.linalg.norm(one))])

@@ -1,11 +1,13 @@
 """A plane through a closed surface before it is meshed: the trace, the pieces it would leave, and whether it can be."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
+from scipy.spatial import KDTree
 
 from massspring.body.surface import winding_number
 from studies.base.errors import StudyError
@@ -119,6 +121,22 @@ def check_sheet(
     elif within is not None:
         _check_front(name, cut, sheet, within)
     return sheet
+
+
+def check_apart(name: str, sheets: Mapping[str, tuple[HalfSpace, Sheet]], edge: float = 0.0) -> None:
+    """Raises StudyError for two cuts of the organ or scene `name` whose sections meet, or whose outlines are less than
+    an `edge` [m] apart; `sheets`: the plane of each cut by name, and what it does to the surface."""
+    for (one, (plane, first)), (other, (_, second)) in combinations(sheets.items(), 2):
+        level = plane.level(second.trace.reshape(-1, 3)).reshape(-1, 2)
+        # Inside the body the planes meet along a line, and where it leaves the body an outline crosses the other plane.
+        if (level.prod(axis=1) <= 0).any():
+            raise StudyError(f"{name}: the planes of cuts {one!r} and {other!r} meet inside the body; move one of them")
+        away = float(KDTree(first.trace.reshape(-1, 3)).query(second.trace.reshape(-1, 3))[0].min())
+        if away < edge:
+            raise StudyError(
+                f"{name}: cuts {one!r} and {other!r} come within {1e3 * away:.2g} mm of each other, and the edges of "
+                f"the mesh are {1e3 * edge:.2g} mm long; move one of them, or use more nodes"
+            )
 
 
 def _check_disc(

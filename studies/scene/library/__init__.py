@@ -3,6 +3,7 @@
 from studies.scene.library.ball_bisected import BALL_BISECTED
 from studies.scene.library.ball_clamped import BALL_CLAMPED
 from studies.scene.library.ball_cut_pressed import BALL_CUT_PRESSED
+from studies.scene.library.ball_cut_twice import BALL_CUT_TWICE
 from studies.scene.library.ball_incised import BALL_INCISED
 from studies.scene.library.ball_ringing import BALL_RINGING
 from studies.scene.library.ball_squeeze import BALL_SQUEEZE
@@ -41,6 +42,7 @@ JUDGED: tuple[Scene, ...] = tuple(scene for scene in SCENES if scene.reference i
 
 CUT: tuple[Scene, ...] = (
     BALL_INCISED,
+    BALL_CUT_TWICE,
     LIVER_INCISED,
     LIVER_CUT_LIVE,
     BALL_BISECTED,
@@ -55,6 +57,7 @@ __all__ = [
     "BALL_BISECTED",
     "BALL_CLAMPED",
     "BALL_CUT_PRESSED",
+    "BALL_CUT_TWICE",
     "BALL_INCISED",
     "BALL_RINGING",
     "BALL_SQUEEZE",

@@ -119,7 +119,7 @@ def _known(scene: Scene, results: Path) -> tuple[Stored, tuple[str, ...]]:
     own = [known for known in ACCURACY.scenes if replace(known, reference=scene.reference) == scene]
     if own:
         return stored(results, own), ()
-    if scene.cut is not None:
+    if scene.cuts:
         raise StudyError(
             f"no results apply to scene '{scene.name}', which cuts its organ: '{ACCURACY.name}' has no such scene; "
             f"`organbench run cutting` compares bodies that are cut"

@@ -50,7 +50,7 @@ def euler(triangles: np.ndarray) -> int:
 
 @pytest.mark.parametrize("layers", [1, 3])
 def test_the_faces_of_the_cut_are_half_a_ring_through_the_wall(layers):
-    made = organ("ball", NODES, {}, parameters=SHELL_OPENED.organ.parameters, layers=layers, cut=SHELL_OPENED.cut)
+    made = organ("ball", NODES, {}, parameters=SHELL_OPENED.organ.parameters, layers=layers, cuts=SHELL_OPENED.cuts)
     faces = made.cuts["opening"]
     assert np.abs(made.points[faces][:, :, 2]).max() < 1e-12
     ring = 0.5 * np.pi * (RADIUS**2 - (RADIUS - WALL) ** 2)
@@ -60,7 +60,7 @@ def test_the_faces_of_the_cut_are_half_a_ring_through_the_wall(layers):
     distance = np.linalg.norm(made.points, axis=1)
     depths = np.unique(np.round((RADIUS - distance) / WALL * layers, 6))
     np.testing.assert_allclose(depths, np.arange(layers + 1))
-    after = opened_mesh(made, "opening").mesh
+    after = opened_mesh(made).mesh
     assert (euler(boundary_triangles(made.tetrahedra)), euler(boundary_triangles(after.tetrahedra))) == (4, 2)
     assert not after.hollow and tetrahedron_volumes(made.points, made.tetrahedra).min() > 0
     assert after.volume == pytest.approx(made.volume, rel=1e-13)

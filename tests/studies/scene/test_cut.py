@@ -36,7 +36,7 @@ def test_a_scene_with_a_cut_is_read_back_as_it_was():
 def test_cuts_that_no_scene_can_have_are_refused(tmp_path):
     with pytest.raises(StudyError, match=r"is made at 0.0 s; give a time after the start"):
         Cut("early", MIDDLE)
-    with pytest.raises(StudyError, match="has 2 cuts; a body is cut once"):
+    with pytest.raises(StudyError, match="has two cuts called"):
         replace(BALL_CLAMPED, cuts=(CUT, CUT))
     file = replace(BALL_CLAMPED, cuts=(CUT,), organ=Organ("file", {"path": str(tmp_path / "no.stl")}))
     with pytest.raises(StudyError, match="only organs of the catalogue are cut so far"):

@@ -171,7 +171,7 @@ CUTS = {
         f"reference=PLAN, cuts=(Cut('slit', {MIDDLE}, at=1.0),)",
         "is cut, and its reference is of an octant or a motion, which are not cut",
     ),
-    "two cuts": (f"cuts=2 * (Cut('slit', {MIDDLE}, at=1.0),)", "has 2 cuts; a body is cut once"),
+    "two cuts": (f"cuts=2 * (Cut('slit', {MIDDLE}, at=1.0),)", "has two cuts called 'slit'; give each its own name"),
 }
 CHARTS = {
     "no module": ("nowhere.at_all:draw", "there is no function 'nowhere.at_all:draw' (ModuleNotFoundError"),
