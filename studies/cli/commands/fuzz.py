@@ -80,9 +80,9 @@ def store_reference(results: Path, found: Sequence[Outcome]) -> None:
 
 
 def store_cuts(results: Path, found: Sequence[Outcome]) -> None:
-    """The same of cuts, counted by organ."""
-    table = table_of(found)
-    write(results, CUTS, table, counts(table, "organ").reset_index())
+    """The same of cuts, counted by kind."""
+    table = table_of(found).assign(kind=[outcome.trial.kind for outcome in found])
+    write(results, CUTS, table, counts(table, "kind").reset_index())
 
 
 def write(results: Path, folder: str, table: pd.DataFrame, counted: pd.DataFrame) -> None:

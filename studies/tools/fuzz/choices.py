@@ -35,7 +35,8 @@ class Choices:
         plain = self.gentlest()
         for name in self.changed:
             yield replace(self, **{name: plain[name]})
+        whole = plain.get("steps", 1)
         for name in ("nodes", "steps"):
-            value = getattr(self, name)
-            if value > 2 * plain[name]:
-                yield replace(self, **{name: int(value // 2 // plain["steps"] * plain["steps"] or value // 2)})
+            value = getattr(self, name, 0)
+            if value > 2 * plain.get(name, value):
+                yield replace(self, **{name: int(value // 2 // whole * whole or value // 2)})

@@ -14,6 +14,7 @@ from studies.tools.fuzz.cuts import (
     case_of,
     draw,
     mesh_of,
+    overlap,
     parted_early,
     parts_differ,
     scene_of,
@@ -35,6 +36,14 @@ def test_everything_is_drawn():
         assert {getattr(trial, name) for trial in trials} >= set(values)
     assert {trial.organ for trial in trials} > {"stomach"} and len({trial.method for trial in trials}) > 5
     assert min(trial.height for trial in trials) < 0 and max(trial.height for trial in trials) > 1
+    assert min(trial.pull for trial in trials) < 0 < max(trial.pull for trial in trials)
+    kinds = {trial.kind for trial in trials}
+    assert kinds >= {"solid", "solid, advancing, touching", "solid, virtual nodes", "solid, paper's surface", "hollow"}
+
+
+def test_a_trial_is_made_gentler_choice_by_choice():
+    trials = list(replace(CALM, nodes=500, advance=0.5).gentler())
+    assert [trial.changed for trial in trials] == [{"advance": 0.5}, {"nodes": 500}, {"nodes": 250, "advance": 0.5}]
 
 
 @pytest.mark.parametrize(
@@ -47,6 +56,13 @@ def test_everything_is_drawn():
         ({"held": "across"}, "crosses the outline of a held region"),
         ({"blade": "ball", "reach": 1.1}, "reaches the surface"),
         ({"when": 0.01}, "is not between two of the 20 frames"),
+        ({"advance": 0.01}, "within one of 20 frames"),
+        ({"body": "surface", "advance": 0.5}, "the surface body does not apply"),
+        ({"body": "surface", "blade": "half space"}, "the surface body does not apply"),
+        ({"body": "quadratic", "organ": "hollow ball", "opens": True}, "which a quadratic body cannot do yet"),
+        ({"way": "virtual", "advance": 0.5}, "whose cut advances"),
+        ({"way": "virtual", "contact": True}, "whose faces of the cut touch"),
+        ({"opens": True}, "its organ is solid"),
     ],
 )
 def test_what_cannot_be_cut_is_refused_before_it_is_meshed(changes, words, monkeypatch):
@@ -59,7 +75,16 @@ def test_what_cannot_be_cut_is_refused_before_it_is_meshed(changes, words, monke
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "changes",
-    [{}, {"blade": "half space", "body": "cotangent", "pull": 0.1}, {"held": "one end", "free": True, "gravity": 9.81}],
+    [
+        {},
+        {"blade": "half space", "body": "cotangent", "pull": 0.1},
+        {"held": "one end", "free": True, "gravity": 9.81},
+        {"body": "surface", "pull": 0.1},
+        {"way": "virtual", "body": "cotangent", "pull": 0.1},
+        {"blade": "half space", "body": "cotangent", "pull": 0.1, "advance": 0.5},
+        {"body": "quadratic", "contact": True, "pull": -0.1},
+        {"organ": "hollow ball", "blade": "half space", "opens": True, "content": "filled", "pull": 0.1},
+    ],
 )
 def test_cuts_that_can_be_run(changes):
     found = tried(replace(CALM, **changes))
@@ -104,9 +129,23 @@ def test_a_cut_that_changes_the_body_is_a_finding():
     assert parted_early(prepared, _History(places)) == "nothing opens"
 
 
+@pytest.mark.slow
+def test_how_deep_faces_overlap():
+    trial = replace(CALM, contact=True)
+    scene = scene_of(trial)
+    with module._own_meshes():
+        prepared = prepared_on(case_of(trial, scene), mesh_of(trial, scene))
+    assert prepared.opening is not None
+    for shift, deep in (((0, 0, -1e-3), 1e-3), ((0, 0, 1e-3), 0.0), ((1.0, 0, -1e-3), 0.0)):
+        places = prepared.body.rest.copy()
+        places[prepared.opening.pairs[:, 1]] += shift
+        assert overlap(prepared, _History(places[None])) == pytest.approx(deep, abs=1e-12)
+
+
 class _History:
     def __init__(self, snapshots: np.ndarray):
         self.snapshots = snapshots
+        self.final = snapshots[-1]
 
 
 @pytest.mark.slow
