@@ -14,11 +14,11 @@ from studies.scene.scene import Scene
 POPULATION = "population"
 """The study that `organbench run population` brings up to date."""
 MEMBERS = (
-    Population("liver", 14),
-    Population("kidney", 10),
-    Population("stomach", 8),
+    Population("liver", 24),
+    Population("kidney", 16),
+    Population("stomach", 12),
     Population("spleen", 6),
-    Population("bladder", 6),
+    Population("bladder", 8),
 )
 NODES = 550
 """Surface nodes of the linear bodies, of a hollow organ as many again on its lumen."""
