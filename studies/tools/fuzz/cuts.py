@@ -19,7 +19,7 @@ from studies.meshing.quadratic_mesh import QuadraticMesh
 from studies.meshing.scene_mesh import mesh_for
 from studies.meshing.shaping import quadratic_mesh
 from studies.runs.case import VIRTUAL, BodyRecipe, Case
-from studies.runs.cutting import LUMEN, check_blade, check_opens, check_virtual
+from studies.runs.cutting import LUMEN, check_blades, check_opens, check_virtual
 from studies.runs.prepare import Prepared, prepared_on
 from studies.scene.checks import check_scene, surface_of
 from studies.scene.cut import Cut
@@ -283,7 +283,7 @@ def check_case(case: Case) -> None:
     """What `prepare` refuses before there is a mesh. Raises StudyError."""
     check_opens(case.scene, case.body)
     if case.scene.cut is not None:
-        check_blade(case.scene.cut, case.scene.name, case.body.kind)
+        check_blades(case.scene, case.body.kind)
     if case.body.cut == VIRTUAL:
         check_virtual(case.scene)
 
