@@ -16,6 +16,7 @@ from studies.plots.campaigns.breaking import draw as draw_chart
 from studies.store.stamps import set_stamp
 from studies.store.tables import write_table
 from studies.tools.fuzz.campaign import counts, run_trials, table_of
+from studies.tools.fuzz.cuts import CutTrial
 from studies.tools.fuzz.cuts import draw as draw_cut
 from studies.tools.fuzz.cuts import tried as try_cut
 from studies.tools.fuzz.outcome import UNEXPLAINED, Attempt, Outcome, simplest, tried
@@ -81,7 +82,8 @@ def store_reference(results: Path, found: Sequence[Outcome]) -> None:
 
 def store_cuts(results: Path, found: Sequence[Outcome]) -> None:
     """The same of cuts, counted by kind."""
-    table = table_of(found).assign(kind=[outcome.trial.kind for outcome in found])
+    kinds = [outcome.trial.kind for outcome in found if isinstance(outcome.trial, CutTrial)]
+    table = table_of(found).assign(kind=kinds)
     write(results, CUTS, table, counts(table, "kind").reset_index())
 
 

@@ -32,10 +32,10 @@ def judged_problem(scene: Scene, mesh: JudgeMesh) -> Problem:
     assert shape is not None  # the judged organs are of the catalogue
     coarse = held_mesh(scene, organ_mesh)
     body = coarse.refined(scene, mesh.at_outlines, 0)
-    solid = as_curved(body, coarse, on_true_shape(curved(organ_mesh), coarse, shape, scene.held, scene.cut))
+    solid = as_curved(body, coarse, on_true_shape(curved(organ_mesh), coarse, shape, scene.held, scene.cuts))
     *patches, _ = body.facets(solid)
     tissue, x = scene.tissue, nodes(solid)
-    if scene.cut is not None:  # copies of a node stay where it was, so `x` holds them too
+    if scene.cuts:  # copies of a node stay where it was, so `x` holds them too
         solid, _ = opened_elements(solid, body.cut_faces)
     return Problem(
         mesh=solid,

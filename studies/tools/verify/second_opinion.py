@@ -36,7 +36,7 @@ def pulled_liver() -> Problem:
 
 def incised_ball() -> Problem:
     """ball_incised at its end, on a coarse mesh that is cut from the start."""
-    (bottom, top), cut = BALL_INCISED.held, BALL_INCISED.cuts[0]
+    bottom, top = BALL_INCISED.held
     mesh = opened_mesh(mesh_for(BALL_INCISED, CUT_NODES, even=True)).mesh
     assert isinstance(mesh, OrganMesh)  # its sides are straight
     pull = top.path(BALL_INCISED.checkpoints[-1])
