@@ -157,7 +157,8 @@ def errors_of(run: Run, nodes: np.ndarray) -> dict[str, Any]:
     after the other, before them those at rest; and the largest."""
     assert run.reference is not None  # the caller checked it
     rest, own = run.fields.rest[nodes], run.fields.snapshots[:, nodes]
-    error = np.linalg.norm(own - rest - run.reference.displacements(rest)[: len(own)], axis=-1)
+    truth = run.reference.displacements(run.places[nodes])[: len(own)]
+    error = np.linalg.norm(own - rest - truth, axis=-1)
     reached = np.array(run.case.scene.checkpoints[: len(own)], float)
     times, rows = from_rest(run.case.scene, reached, np.zeros(len(nodes)), error)
     return {

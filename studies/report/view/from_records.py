@@ -37,7 +37,7 @@ def _error(run: Run, solution: Solution | None, displacement: np.ndarray) -> np.
         return None
     error = np.full_like(displacement, np.nan)
     nodes = run.material_nodes
-    error[:, nodes] = displacement[:, nodes] - solution.displacements(run.fields.rest[nodes])
+    error[:, nodes] = displacement[:, nodes] - solution.displacements(run.places[nodes])
     return error
 
 

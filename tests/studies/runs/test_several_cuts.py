@@ -21,6 +21,8 @@ from studies.reference.nested import path_of, problems_of
 from studies.reference.problem import problem_on
 from studies.reference.reference_solves import ReferenceSolve
 from studies.reference.solve import solve
+from studies.report.page.case_data import errors_of
+from studies.report.view.from_records import shown_run
 from studies.runs.case import BodyRecipe, Case
 from studies.runs.prepare import prepare, prepared_on
 from studies.runs.run import measure
@@ -70,6 +72,22 @@ def test_both_incisions_gape_as_in_the_reference(judged):
         truth = run.gap(run.reference.opening(run.fields.rest[run.cut_pairs[:, 0]]))
         assert widest[0] == pytest.approx(widest[1], rel=alike) and min(widest) > 0.05 * RADIUS
         assert truth[run.cut_of_pairs == 0].max() == pytest.approx(truth[run.cut_of_pairs == 1].max(), rel=0.01)
+
+
+def test_page_and_view_compare_each_side_of_a_cut_with_its_own_side_of_the_reference(judged):
+    run = judged["quadratic"]
+    behind, front = run.cut_pairs.T
+    step = 1e-4 * RADIUS * np.array(UP)
+    truth = [run.reference.displacements(run.fields.rest[behind] + sign * step)[-1] for sign in (-1, 1)]
+    wide = np.linalg.norm(truth[1] - truth[0], axis=1)
+    assert wide.max() > 0.05 * RADIUS  # asked at the cut itself, one of the sides would be wrong by this
+    moved = run.fields.snapshots[-1] - run.fields.rest
+    wrong = [np.linalg.norm(moved[side] - of, axis=1) for side, of in zip((behind, front), truth, strict=True)]
+    shown = shown_run(run, run.reference, "quadratic")
+    assert shown.error is not None
+    for side, sizes in zip((behind, front), wrong, strict=True):
+        assert np.linalg.norm(shown.error[-1, side], axis=1) == pytest.approx(sizes, abs=1e-3 * RADIUS)
+    assert errors_of(run, run.cut_pairs.ravel())["largest"] < 0.5 * wide.max()
 
 
 def test_each_pair_belongs_to_the_cut_in_whose_plane_it_lies(judged):
