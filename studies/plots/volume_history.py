@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
@@ -28,29 +27,43 @@ TITLE = "How much volume each model loses"
 PERCENT = 100.0
 SMALLEST = 1e-10
 """Bottom of the logarithmic axis [%]: below it stands only what rounding leaves."""
+VISIBLE = 0.5
+"""Change of a volume [%] from which on its sign is worth a panel."""
+WIDEST = 4
+"""Scenes in a row."""
 
 
 @styled
 def figure(runs: Sequence[Run]) -> Figure:
-    """One column of panels per scene."""
+    """Of each scene a panel in per cent and a logarithmic one below it; the latter alone where no volume changes by
+    more than VISIBLE."""
     shown = [run for run in runs if has_frames(run)]
     if not shown:
         return blank(TITLE, "no run has recorded a frame yet")
     scenes, looks = by_scene(shown), body_looks(shown)
-    sheet = page(2.7 * len(scenes) + 0.9, 6.0)
-    axes = panels(sheet, 2, len(scenes), sharex="col", sharey="row")
-    for (name, group), (upper, lower) in zip(scenes.items(), axes.T, strict=True):
-        upper.set_title(heading(name))
+    lowest, highest = _range(shown)
+    height = 1 if max(-lowest, highest) <= VISIBLE else 2
+    columns = min(len(scenes), WIDEST)
+    blocks = -(-len(scenes) // columns)
+    sheet = page(2.7 * columns + 0.9, 2.7 * height * blocks + 0.6)
+    axes = panels(sheet, height * blocks, columns)
+    for spare in range(len(scenes), blocks * columns):
+        for panel in axes[-height:, spare % columns]:
+            panel.set_axis_off()
+    for number, (name, group) in enumerate(scenes.items()):
+        top, column = height * (number // columns), number % columns
+        column_axes = axes[top : top + height, column]
+        column_axes[0].set_title(heading(name))
         for same in grouped(group, lambda run: (run.case.body, run.case.method.name)):
             for run in same:
-                _draw_run(upper, lower, run, looks[run.case.body], finer=run is not same[0])
-        _draw_reference(upper, lower, group[0])
-        lower.set_xlabel("time [s]")
-    _scale(axes, shown)
+                _draw_run(column_axes, run, looks[run.case.body], finer=run is not same[0])
+        _draw_reference(column_axes, group[0])
+        _scale(column_axes, lowest, highest, first=column == 0)
     handles = [*body_method_handles(shown, looks), reference_handle()]
     if len(shown) > len({(run.case.scene.name, run.case.body, run.case.method.name) for run in shown}):
         handles.append(Line2D([], [], color=GREY, linewidth=0.9, label="thin: the same at a smaller time step"))
-    return finish(sheet, TITLE, handles, [*_stiffness(shown), *remarks(runs)], columns=3)
+    flat = [f"No volume changes by more than {VISIBLE:g} %, so only its size is drawn."] if height == 1 else []
+    return finish(sheet, TITLE, handles, [*flat, *_stiffness(shown), *remarks(runs)], columns=3)
 
 
 def _stiffness(shown: Sequence[Run]) -> list[str]:
@@ -61,36 +74,48 @@ def _stiffness(shown: Sequence[Run]) -> list[str]:
     return [f"The tissue of the reference gives way a little: κ/μ = {', '.join(f'{ratio:,.0f}' for ratio in ratios)}."]
 
 
-def _draw_run(upper: Axes, lower: Axes, run: Run, body: BodyLook, finer: bool) -> None:
+def _draw_run(axes: np.ndarray, run: Run, body: BodyLook, finer: bool) -> None:
     """The first run of a series in full; the same with another step as a thin line where the two differ visibly."""
     good = slice(0, good_frames(run))
     change = PERCENT * (run.volume_ratio[good] - 1)
     look = {"color": body.colour(run.case.method.name), "linestyle": body.line}
-    if not finer:
-        upper.plot(run.fields.t[good], change, **look)
+    if len(axes) > 1 and not finer:
+        axes[0].plot(run.fields.t[good], change, **look)
     # Zero has no logarithm; an exact volume lies on the bottom of the axis.
-    lower.plot(run.fields.t[good], np.maximum(np.abs(change), SMALLEST), linewidth=0.9 if finer else 1.6, **look)
+    axes[-1].plot(run.fields.t[good], np.maximum(np.abs(change), SMALLEST), linewidth=0.9 if finer else 1.6, **look)
 
 
-def _draw_reference(upper: Axes, lower: Axes, run: Run) -> None:
+def _draw_reference(axes: np.ndarray, run: Run) -> None:
     if run.reference is None:
         return
     t, change = run.reference.field("t"), PERCENT * (run.reference.field("volume") - 1)
     look = {"color": BLACK, "marker": "o", "linestyle": "", "markersize": 5.5, "markeredgecolor": "white", "zorder": 5}
-    upper.plot(t, change, **look)
-    lower.plot(t, np.abs(change), **look)
+    if len(axes) > 1:
+        axes[0].plot(t, change, **look)
+    axes[-1].plot(t, np.abs(change), **look)
 
 
-def _scale(axes: np.ndarray, shown: Sequence[Run]) -> None:
-    """From what runs that ended well need: a volume on its way to infinity would flatten everything else."""
+def _range(shown: Sequence[Run]) -> tuple[float, float]:
+    """The least and the largest change [%] of runs that ended well: a volume on its way to infinity would flatten
+    everything else."""
     ended_well = [run for run in shown if run.record.status in COMPARABLE]
     change = np.concatenate([[0.0], *(PERCENT * (run.volume_ratio - 1) for run in ended_well)])
-    lowest, highest = min(-1.0, float(change.min())), max(0.5, float(change.max()))
-    axes[0, 0].set_ylim(1.08 * lowest, highest + 0.04 * (highest - lowest))
-    axes[0, 0].set_ylabel("volume V/V₀ − 1 [%]")
-    axes[1, 0].set_yscale("log")
-    axes[1, 0].set_ylim(SMALLEST, 1e2)
-    axes[1, 0].set_ylabel("size |V/V₀ − 1| [%]")
+    return float(change.min()), float(change.max())
+
+
+def _scale(axes: np.ndarray, lowest: float, highest: float, first: bool) -> None:
+    """The same for all scenes; words on the axes of the first of a row alone."""
+    if len(axes) > 1:
+        low, high = min(-1.0, lowest), max(0.5, highest)
+        axes[0].set_ylim(1.08 * low, high + 0.04 * (high - low))
+        axes[0].set_ylabel("volume V/V₀ − 1 [%]" if first else "")
+        axes[0].tick_params(labelbottom=False)
+    axes[-1].set_yscale("log")
+    axes[-1].set_ylim(SMALLEST, 1e2)
+    axes[-1].set_ylabel("size |V/V₀ − 1| [%]" if first else "")
+    axes[-1].set_xlabel("time [s]")
+    for panel in axes:
+        panel.tick_params(labelleft=first)
 
 
 draw = drawing(figure)

@@ -1,5 +1,7 @@
 """What the charts of accuracy say: numbers where they belong, never below the floor, doubtful ones marked."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -45,12 +47,27 @@ def test_a_missing_reference_is_said():
 
 
 def test_the_smaller_step_is_thin_and_in_the_lower_panel_alone():
-    runs = [run(volume_end=1e-8), run(volume_end=1e-9, fraction=0.05)]
+    runs = [run(volume_end=-0.02), run(volume_end=-0.01, fraction=0.05)]
     upper, lower = volume_history.figure(runs).axes
     assert len(lines(upper, BLUE)) == 1
     coarse, fine = lines(lower, BLUE)
     assert fine.get_linewidth() < coarse.get_linewidth()
     assert "smaller time step" in words(volume_history.figure(runs).legends[0])
+
+
+def test_where_no_volume_changes_only_its_size_is_drawn():
+    figure = volume_history.figure([run(volume_end=1e-8)])
+    (size,) = figure.axes
+    assert size.get_yscale() == "log" and len(lines(size, BLUE)) == 1
+    assert "only its size is drawn" in words(figure)
+    assert len(volume_history.figure([run(volume_end=0.006)]).axes) == 2
+
+
+def test_many_scenes_stand_in_rows_of_four():
+    runs = [run(scene=replace(BALL_SQUEEZE, name=f"ball_{k}"), volume_end=-0.02) for k in range(5)]
+    drawn = [axes for axes in volume_history.figure(runs).axes if axes.axison]
+    assert len(drawn) == 10 and len({round(axes.get_position().x0, 3) for axes in drawn}) == 4
+    assert [axes.get_title() for axes in drawn if axes.get_title()] == [f"Ball {k}" for k in range(5)]
 
 
 @pytest.mark.parametrize(("error", "said"), [(0.25, "−25 %"), (-0.1, "+10 %")])
