@@ -25,7 +25,7 @@ BODIES = {
     "a volume per node": BodyRecipe(nodes=LINEAR, volumes="nodal"),
     "quadratic": BodyRecipe("quadratic", 4 * VERTICES - 6),
 }
-FRAMES, STEPS, REPEATS = 24, 5, 7
+FRAMES, STEPS, REPEATS, ROUNDS = 24, 5, 7, 21
 PREPARED, SWAP, SLOWER = 33.0, 1.0, 1.1
 """Promises: [ms] of an event in a run, a frame of video; [ms] of handing over positions and velocities; and a step
 after the cut over one before."""
@@ -70,9 +70,12 @@ def lines_of(name: str, setup: Setup) -> list[BenchLine]:
         event = fastest_ms(lambda: second.entered(state))
         swap = fastest_ms(lambda: (state.x[nodes], state.v[nodes]))
         runs = {"before": still, "after": after}
-        times = interleave({key: (lambda s=s: simulate(s).frame_ns) for key, s in runs.items()}, REPEATS)
-    ratio = ratio_with_spread(*(times[key][:, FRAMES // 4 :] for key in ("after", "before")))
-    step = 1e-6 * float(np.min(times["before"])) / STEPS
+        times = interleave({key: (lambda s=s: simulate(s).frame_ns) for key, s in runs.items()}, ROUNDS)
+    # Other work on the machine only adds, so of each frame the shortest of all rounds counts.
+    least = {key: np.min(frames[:, FRAMES // 4 :], axis=0) for key, frames in times.items()}
+    ratio = float(least["after"].sum() / least["before"].sum())
+    spread = ratio_with_spread(*(times[key][:, FRAMES // 4 :] for key in ("after", "before")))
+    step = 1e-6 * float(np.min(least["before"])) / STEPS
     what = f"cut, {name}: "
     note = f"{setup.body.node_count} to {after.body.node_count} nodes"
     return [
@@ -81,9 +84,9 @@ def lines_of(name: str, setup: Setup) -> list[BenchLine]:
         BenchLine(f"{what}set-up and states of both bodies", preparing, "ms", note="before the first frame"),
         BenchLine(
             f"{what}a step after it over one before",
-            ratio.median,
+            ratio,
             "1",
             SLOWER,
-            note=f"{step:.3g} ms; rounds {ratio.low:.3g} to {ratio.high:.3g}",
+            note=f"{step:.3g} ms; medians of rounds {spread.low:.3g} to {spread.high:.3g}",
         ),
     ]
