@@ -39,6 +39,8 @@ def face_pairs(body: Body, pairs: np.ndarray) -> FacePairs:
         side=side,
         reach=reach,
         normal=np.zeros((len(pairs), 3)),
+        area=np.zeros(len(pairs)),
+        lever=np.zeros((len(pairs), 3)),
         gap=np.full(len(pairs), np.inf),
         touches=np.zeros(len(pairs), dtype=np.uint8),
         impulse=np.zeros(len(pairs)),

@@ -43,7 +43,7 @@ from massspring.kernels.step.begin import (
     search_contacts,
 )
 from massspring.kernels.step.end import end_step
-from massspring.kernels.step.touching_faces import contacts_stand, search_pairs
+from massspring.kernels.step.touching_faces import begin_pairs, contacts_stand, search_pairs
 from massspring.layout.allocate import start
 from massspring.layout.block_jacobi import clusters_at_rest
 from massspring.layout.state import State
@@ -65,6 +65,7 @@ def implicit_volume_frame(frame, lam, pairs):
     open_frame(frame)
     for step in range(boundary.position.shape[0]):
         volume, flow, mobility = begin_summed_step(frame, step)
+        flow += begin_pairs(frame, pairs, gradient)
         error = boundary.volume_target[step, 0] - volume
         predicted, left = lam, 0.0
         passes = search_contacts(frame, step, Push(gradient, predicted))
@@ -160,6 +161,7 @@ def implicit_volumes_frame(frame, rows, accuracy, pairs):
     open_frame(frame)
     for step in range(boundary.position.shape[0]):
         begin_step(frame, step, False)
+        begin_pairs(frame, pairs, None)
         rows_into(nodes.x, model.inverse_mass, rows)
         transposed_rows_times_into(rows, rows.lam, rows.push)
         end_stage(diagnostics.stage_times, VOLUME)

@@ -25,6 +25,10 @@ class FacePairs(NamedTuple):
     """Mean length of the edges of the faces at a pair at rest [m], (p,): a pair that slips farther is none."""
     normal: np.ndarray
     """Unit normal of both faces together, from behind the cut to its front, (p, 3)."""
+    area: np.ndarray
+    """Length of the sum that the normal is along, twice the areas of the triangles around both nodes [m²], (p,)."""
+    lever: np.ndarray
+    """Impulse of the last step times slip over `area`, what turns the triangles around a pair [N s/m], (p, 3)."""
     gap: np.ndarray
     """n·(x_front − x_behind) at the start of the step [m], (p,); inf where a pair cannot touch."""
     touches: np.ndarray

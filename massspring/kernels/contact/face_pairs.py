@@ -33,13 +33,15 @@ def normals_into(pairs, x):
                     normal[p, 2] += a0 * b1 - a1 * b0
     for p in range(normal.shape[0]):
         size = math.sqrt(normal[p, 0] ** 2 + normal[p, 1] ** 2 + normal[p, 2] ** 2)
+        pairs.area[p] = size
         for axis in range(3):
             normal[p, axis] /= size
 
 
 @njit_lean
 def measure_pairs(pairs, x, inverse_mass):
-    """Normals and gaps at the start of a step; no pair touches yet. A pair farther apart than its reach cannot."""
+    """Normals, gaps and levers at the start of a step; no pair touches yet. A pair farther apart than its reach
+    cannot."""
     normals_into(pairs, x)
     node, normal = pairs.node, pairs.normal
     for p in range(node.shape[0]):
@@ -52,6 +54,42 @@ def measure_pairs(pairs, x, inverse_mass):
             pairs.lost[0] += 1
         pairs.touches[p] = 0
         pairs.gap[p] = gap if near and inverse_mass[i] + inverse_mass[j] > 0.0 else math.inf
+        share = pairs.impulse[p] / pairs.area[p] if pairs.gap[p] < math.inf else 0.0
+        pairs.lever[p, 0] = share * (d0 - gap * normal[p, 0])
+        pairs.lever[p, 1] = share * (d1 - gap * normal[p, 1])
+        pairs.lever[p, 2] = share * (d2 - gap * normal[p, 2])
+
+
+@njit_lean
+def turn_faces(pairs, x, inverse_mass, v_star, gradient):
+    """v* of the faces with what the impulses of the last step do to them by their slip: the normal of a pair turns with
+    the triangles around it, so they carry the couple of the pair (eq. 9.11). Returns what G·v* gains [m³/s], 0 without
+    a `gradient`."""
+    corner, pair, lever = pairs.corner, pairs.pair, pairs.lever
+    flow = 0.0
+    for t in range(corner.shape[0]):
+        q0, q1, q2 = 0.0, 0.0, 0.0
+        for c in range(3):
+            p = pair[t, c]
+            if p >= 0:
+                q0, q1, q2 = q0 + lever[p, 0], q1 + lever[p, 1], q2 + lever[p, 2]
+        if q0 == 0.0 and q1 == 0.0 and q2 == 0.0:
+            continue
+        for first in (0, 3):
+            i, j, k = corner[t, first], corner[t, first + 1], corner[t, first + 2]
+            a0, a1, a2 = x[j, 0] - x[i, 0], x[j, 1] - x[i, 1], x[j, 2] - x[i, 2]
+            b0, b1, b2 = x[k, 0] - x[i, 0], x[k, 1] - x[i, 1], x[k, 2] - x[i, 2]
+            # Q·δ(a × b) = δa·(b × Q) + δb·(Q × a)
+            f0, f1, f2 = b1 * q2 - b2 * q1, b2 * q0 - b0 * q2, b0 * q1 - b1 * q0
+            g0, g1, g2 = q1 * a2 - q2 * a1, q2 * a0 - q0 * a2, q0 * a1 - q1 * a0
+            for n, h0, h1, h2 in ((i, -f0 - g0, -f1 - g1, -f2 - g2), (j, f0, f1, f2), (k, g0, g1, g2)):
+                w = inverse_mass[n]
+                v_star[n, 0] += w * h0
+                v_star[n, 1] += w * h1
+                v_star[n, 2] += w * h2
+                if gradient is not None:
+                    flow += w * (gradient[n, 0] * h0 + gradient[n, 1] * h1 + gradient[n, 2] * h2)
+    return flow
 
 
 @njit_inlined

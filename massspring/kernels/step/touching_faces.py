@@ -1,10 +1,22 @@
 """When the faces of a cut touch: with the search for obstacles, and after each solve for the multipliers."""
 
 from massspring.kernels.contact.active_set import CONTACT_PASSES
-from massspring.kernels.contact.face_pairs import measure_pairs, revise_pairs
+from massspring.kernels.contact.face_pairs import measure_pairs, revise_pairs, turn_faces
 from massspring.kernels.jit.decorators import njit_inlined
 from massspring.kernels.jit.stage_clock import REVISION, SEARCH, end_stage
 from massspring.kernels.step.begin import multiplier_stands
+
+
+@njit_inlined
+def begin_pairs(frame, pairs, gradient):
+    """Measures the pairs, and lets the impulses of the last step turn their faces, before anything else asks for v*;
+    what G·v* gains by it [m³/s], 0 without a `gradient`."""
+    if pairs is None:
+        return 0.0
+    measure_pairs(pairs, frame.nodes.x, frame.model.inverse_mass)
+    flow = turn_faces(pairs, frame.nodes.x, frame.model.inverse_mass, frame.nodes.v_star, gradient)
+    end_stage(frame.diagnostics.stage_times, SEARCH)
+    return flow
 
 
 @njit_inlined
@@ -12,7 +24,6 @@ def search_pairs(frame, push, passes, pairs):
     """Finds the pairs that touch while the last known push acts (eq. 9.9); how many passes the active set may take."""
     if pairs is None:
         return passes
-    measure_pairs(pairs, frame.nodes.x, frame.model.inverse_mass)
     revise_pairs(pairs, frame.model, frame.nodes, frame.contacts, push, frame.boundary.dt)
     end_stage(frame.diagnostics.stage_times, SEARCH)
     return CONTACT_PASSES

@@ -30,7 +30,7 @@ from massspring.kernels.step.begin import (
     search_contacts,
 )
 from massspring.kernels.step.end import end_step
-from massspring.kernels.step.touching_faces import contacts_stand, search_pairs
+from massspring.kernels.step.touching_faces import begin_pairs, contacts_stand, search_pairs
 
 
 @by_address
@@ -99,6 +99,7 @@ def point_volumes_frame(frame, rows, implicit, accuracy, pairs):
     open_frame(frame)
     for step in range(boundary.position.shape[0]):
         begin_step(frame, step, False)
+        begin_pairs(frame, pairs, None)
         weigh_into(model, nodes, rows, boundary)
         if implicit is not None:
             take_springs_implicitly(frame, rows, implicit)

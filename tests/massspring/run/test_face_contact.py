@@ -19,7 +19,7 @@ from massspring import (
     step_limit,
 )
 from massspring.body.opening import opened
-from massspring.kernels.contact.face_pairs import normals_into
+from massspring.kernels.contact.face_pairs import measure_pairs, normals_into, turn_faces
 from massspring.layout.face_pairs import face_pairs
 from massspring.methods.method import begin_frame
 from tests.massspring.conftest import boundary
@@ -130,6 +130,26 @@ def test_halves_that_meet_in_flight_keep_their_momentum(kind):
     assert pushed > 0.0
     speed = [body.mass[s] @ state.v[s, 0] / body.mass[s].sum() for s in (front, ~front)]
     assert speed[0] - speed[1] > -0.05  # of -0.4 m/s
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_halves_that_slide_in_flight_keep_their_spin(kind):
+    """Each pair pushes two nodes that slipped past each other; the faces around them bear the couple of that."""
+    halves = Halves(kind)
+    body = halves.cut
+    front = body.rest[:, 0] > MIDDLE
+    front[halves.pairs[:, 1]] = True
+    v = np.where(front[:, None], [-0.2, 0.0, 0.1], [0.2, 0.0, -0.1])
+    clock = make_clock(0.02, 10, 0.5 * step_limit(body).damped, step_limit(body))
+    setup = halves.setup(body, True, attachments=(), damping=0.0, velocity=v, clock=clock)
+    i, j = halves.pairs.T
+    spin, couple = np.cross(body.rest, v).T @ body.mass, np.zeros(3)
+    for _, before, after, pairs, _ in steps(setup):
+        couple += np.cross(before.x[j] - before.x[i], pairs.impulse[:, None] * pairs.normal).sum(axis=0)
+        now = np.cross(after.nodes.x, after.v).T @ body.mass
+    assert np.linalg.norm(couple) > 0.05 * np.linalg.norm(spin)
+    # One step late, so what the last impulses and their changes do is left.
+    assert np.linalg.norm(now - spin) < 0.2 * np.linalg.norm(couple)
 
 
 def steps(setup: Setup):
@@ -252,6 +272,37 @@ def test_the_mean_normal_is_the_slope_of_the_gap_where_faces_touch():
     turned = pairs._replace(corner=np.ascontiguousarray(pairs.corner[:, [3, 4, 5, 0, 1, 2]]))
     normals_into(turned, shifted)
     np.testing.assert_allclose(ahead, turned.normal, atol=1e-12)
+
+
+@pytest.mark.parametrize("kind", ["cotangent", "quadratic"])
+def test_impulses_of_pairs_that_slipped_act_along_the_slope_of_their_gaps(kind):
+    """Finite differences of Σ k n(x)·(x_front − x_behind) with slip (eq. 9.11); neither force nor moment is left."""
+    halves = Halves(kind)
+    pairs = face_pairs(halves.cut, halves.pairs)
+    i, j = halves.pairs.T
+    random = np.random.default_rng(5)
+    x = halves.cut.rest + 1e-3 * random.normal(size=halves.cut.rest.shape)
+    x[j] += [0.0, 2e-3, -1e-3]
+    pairs = pairs._replace(reach=np.full(len(i), 1.0), impulse=random.uniform(0.5, 1.0, len(i)))
+
+    def pushed(x: np.ndarray) -> float:
+        normals_into(pairs, x)
+        return pairs.impulse @ np.einsum("pi,pi->p", pairs.normal, x[j] - x[i])
+
+    way = random.normal(size=x.shape)
+    slope = (pushed(x + 1e-7 * way) - pushed(x - 1e-7 * way)) / 2e-7
+    given, mass, gradient = np.zeros_like(x), random.uniform(0.5, 2.0, len(x)), random.normal(size=x.shape)
+    measure_pairs(pairs, x, np.ones(len(x)))
+    flow = turn_faces(pairs, x, 1.0 / mass, given, gradient)
+    assert flow == pytest.approx((gradient * given).sum(), rel=1e-12)
+    assert turn_faces(pairs, x, 1.0 / mass, np.zeros_like(x), None) == 0.0
+    force = mass[:, None] * given
+    assert np.abs(force).max() > 0.01
+    np.add.at(force, j, pairs.impulse[:, None] * pairs.normal)
+    np.add.at(force, i, -pairs.impulse[:, None] * pairs.normal)
+    assert slope == pytest.approx((force * way).sum(), rel=1e-6)
+    assert np.abs(force.sum(axis=0)).max() < 1e-12 * np.abs(force).sum()
+    assert np.abs(np.cross(x, force).sum(axis=0)).max() < 1e-12 * np.abs(force).sum() * np.abs(x).max()
 
 
 def test_faces_that_slide_by_more_than_an_edge_are_told_and_let_go():
