@@ -73,10 +73,7 @@ def graded(scene: Scene) -> tuple[BodyRecipe, ...]:
 
 
 def is_adaptive(scene: Scene) -> bool:
-    """Whether one solution of a coarse body can say where elements should be small (studies.reference.adaptive_mesh).
-
-    What hangs by an outline is left out: small elements there turn inside out.
-    """
+    """Whether one solution of the coarse body can say where elements should be small."""
     return bool(scene.held) and load_of(scene) not in NOT_ADAPTIVE
 
 

@@ -110,14 +110,8 @@ class NestedMesh:
     @cached_property
     def small_at_outlines(self) -> np.ndarray:
         """Elements with a vertex on an outline whose halves would be smaller than SMALLEST, (ne,) bool."""
-        flat = MeshTet2.from_mesh(self.body.mesh)
-        *held, _ = self.body.facets(flat)
-        outlines = np.concatenate([*(rim_sides(facets)[:, :2].ravel() for facets in held), self.body.front])
-        corners = self.body.mesh.t.T
-        volume = np.abs(tetrahedron_volumes(self.points, corners))
-        size = np.cbrt(0.5 * volume / REGULAR)
         least = SMALLEST * float(np.linalg.norm(np.ptp(self.points, axis=0)))
-        return np.isin(corners, outlines).any(axis=1) & (size < least)
+        return small_at_outlines(self.body, self.points, least)
 
     @property
     def lost_area(self) -> float:
@@ -187,10 +181,29 @@ def _base_mesh(scene: Scene, surface_nodes: int, at_contact: int) -> NestedMesh:
     return NestedMesh(scene, body, points)
 
 
-def marked(body: HeldMesh, indicator: np.ndarray, elements: int) -> tuple[HeldMesh, np.ndarray]:
-    """`body` with elements halved until there are `elements`, and the parent of each; largest indicators first."""
+def small_at_outlines(body: HeldMesh, points: np.ndarray, least: float) -> np.ndarray:
+    """Elements with a vertex on an outline or the front of a cut whose halves would have edges shorter than `least` [m]
+    if their vertices were at `points` (n, 3) [m], (ne,) bool."""
+    edge = edges_of(points, body.mesh.t.T) * 0.5 ** (1 / 3)
+    there = np.zeros(body.mesh.nelements, dtype=bool)
+    there[body.at_outlines()] = True
+    return there & (edge < least)
+
+
+def edges_of(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
+    """Edge of the regular tetrahedron that has the volume of each of `cells` (k, 4) [m], (k,)."""
+    return np.cbrt(np.abs(tetrahedron_volumes(points, cells)) / REGULAR)
+
+
+def marked(body: HeldMesh, indicator: np.ndarray, elements: int, least: float = 0.0) -> tuple[HeldMesh, np.ndarray]:
+    """`body` with elements halved until there are `elements`, and the parent of each; largest indicators first.
+    Elements at outlines are not marked where their halves would have edges shorter than `least` [m]."""
     parents, expected = np.arange(body.mesh.nelements), indicator.astype(float)
-    while body.mesh.nelements < elements and expected.max() > 0.0:
+    while body.mesh.nelements < elements:
+        if least > 0.0:
+            expected = np.where(small_at_outlines(body, body.mesh.p.T, least), 0.0, expected)
+        if not expected.max() > 0.0:
+            break
         count = body.mesh.nelements
         room = max(1, (min(elements, int(GROWTH * count)) - count) // 3)
         # Rounded, then by number: the last bits of an indicator differ between processors.

@@ -22,7 +22,7 @@ from studies.meshing.bounds import HELD_AREA
 from studies.meshing.graded_mesh import check_number, halved, is_hollow, mesh_at, middles, outer_nodes
 from studies.meshing.held_mesh import HeldMesh
 from studies.meshing.kept_shape import held_area_error, level_that_holds
-from studies.meshing.nested_mesh import marked
+from studies.meshing.nested_mesh import edges_of, marked
 from studies.meshing.opened_mesh import opened_elements
 from studies.meshing.quadratic_mesh import QuadraticMesh
 from studies.meshing.reference_mesh import on_true_sides
@@ -39,6 +39,9 @@ MOST = 0.95
 """The same at most, for a mesh that keeps the area of all held regions."""
 LOOSE = NewtonSettings(force_tol=1e-4, penetration_tol=1e-3)
 """Enough to rank elements."""
+STRAIN = 1.0
+"""Largest stretch less 1 that an element at an outline may expect. There it grows as 1/√h while elements shrink, until
+they turn inside out (measured: docs/accuracy.md)."""
 STEP = 1.25
 """Factor by which the number of elements grows until there are enough surface nodes."""
 
@@ -66,8 +69,12 @@ def adaptive_mesh(scene: Scene, wanted: int) -> QuadraticMesh:
         "scene": scene_to_json(replace(scene, name="", title="", reference=None)),
     }
     shape = {"points": organ_mesh.points, "tetrahedra": organ_mesh.tetrahedra}
-    found = cached(recipe, shape, ("indicator",), lambda: {"indicator": indicator_of(scene, organ_mesh, coarse)})
-    return quadratic_mesh(scene, organ_mesh, coarse, adapted(coarse, found["indicator"], wanted), middles(scene))
+    names = "indicator", "stretch"
+    found = cached(
+        recipe, shape, names, lambda: dict(zip(names, indicators_of(scene, organ_mesh, coarse), strict=True))
+    )
+    fine = adapted(coarse, found["indicator"], wanted, least_edge(coarse, found["stretch"]))
+    return quadratic_mesh(scene, organ_mesh, coarse, fine, middles(scene))
 
 
 def coarse_mesh(scene: Scene, wanted: int) -> tuple[OrganMesh, HeldMesh]:
@@ -99,9 +106,9 @@ def why_not(scene: Scene) -> str | None:
     return NOT_ADAPTIVE.get(load_of(scene))
 
 
-def indicator_of(scene: Scene, organ_mesh: OrganMesh, coarse: HeldMesh) -> np.ndarray:
+def indicators_of(scene: Scene, organ_mesh: OrganMesh, coarse: HeldMesh) -> tuple[np.ndarray, np.ndarray]:
     """The error indicator of the elements of the coarse body, opened along the scene's cuts, at its last checkpoint,
-    (ne,), over the largest.
+    over the largest, and the largest principal stretch between their corners, both (ne,).
 
     Raises StudyError where no equilibrium is found."""
     try:
@@ -119,21 +126,35 @@ def indicator_of(scene: Scene, organ_mesh: OrganMesh, coarse: HeldMesh) -> np.nd
         raise StudyError(
             f"scene '{scene.name}': the coarse body has no solution by which to adapt ({error}); choose graded=True"
         ) from error
-    indicator = stress_indicator(System(problem, LOOSE), ends[-1].state.x)
-    return indicator / indicator.max()
+    x = ends[-1].state.x
+    indicator, rest = stress_indicator(System(problem, LOOSE), x), nodes(problem.mesh)
+    corners = problem.mesh.t[:4].T
+    before, after = (np.diff(at[corners], axis=1) for at in (rest, rest + x[: rest.size].reshape(-1, 3)))
+    gradient = np.linalg.solve(before, after)  # rows are edges, so this is the deformation gradient transposed
+    return indicator / indicator.max(), np.linalg.svd(gradient, compute_uv=False)[:, 0]
 
 
-def adapted(coarse: HeldMesh, indicator: np.ndarray, wanted: int) -> HeldMesh:
+def least_edge(coarse: HeldMesh, stretch: np.ndarray) -> float:
+    """The shortest edge [m] of an element at an outline whose stretch less 1 stays below STRAIN: near an outline it
+    goes as r^-1/2, so an element of edge h with `stretch` (ne,) may shrink to h ((stretch − 1)/STRAIN)²."""
+    there = coarse.at_outlines()
+    edge = edges_of(coarse.mesh.p.T, coarse.mesh.t.T[there])
+    return float((edge * ((stretch[there] - 1.0) / STRAIN) ** 2).max(initial=0.0))
+
+
+def adapted(coarse: HeldMesh, indicator: np.ndarray, wanted: int, least: float = 0.0) -> HeldMesh:
     """`coarse` with elements halved, largest indicator (ne,) first, until there are `wanted` nodes on the outer
-    surface."""
+    surface; at outlines none to edges shorter than `least` [m]."""
     few, many, body = 0, coarse.mesh.nelements, coarse
     while outer_nodes(body, quadratic=True) < wanted:
         few, many = many, round(STEP * many)
-        body = marked(coarse, indicator, many)[0]
+        body = marked(coarse, indicator, many, least)[0]
+        if body.mesh.nelements <= few:
+            raise StudyError(f"no element is left to halve, and the mesh has fewer than {wanted} nodes; ask for fewer")
     # The fewest elements that do, within one in a hundred.
     while few and many - few > max(1, many // 100):
         middle = (few + many) // 2
-        tried = marked(coarse, indicator, middle)[0]
+        tried = marked(coarse, indicator, middle, least)[0]
         if outer_nodes(tried, quadratic=True) < wanted:
             few = middle
         else:

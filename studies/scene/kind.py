@@ -11,7 +11,6 @@ NOT_ADAPTIVE = {
     "motion": "its load has no static solution",
     "thin probe": "the reference elements do not know a thin probe",
     "rest": "nothing loads it",
-    "sag": "small elements at the outline by which it hangs turn inside out",
 }
 """Loads of a scene -> why no solution by reference elements says where its body needs small elements."""
 
