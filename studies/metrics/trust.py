@@ -101,7 +101,7 @@ def judgements(runs: Sequence[Run], share: float = SHARE) -> list[Judgement]:
             continue
         nodes = (coarse.case.body.nodes, fine.case.body.nodes)
         found.append(
-            Judgement(scene.name, nodes, between, within(between, wish, share) and not hangs(scene), all(known))
+            Judgement(scene.name, nodes, between, within(between, wish, share * strictness(scene)), all(known))
         )
     return found
 
@@ -153,16 +153,18 @@ def _verdict(scene: str, coarse: Run, fine: Run) -> Verdict:
         if value == value
     ]
     facets = contact_facets(fine)
-    shared = "; both lack the same at the outline by which it hangs" if hangs(fine.case.scene) else ""
+    strict = strictness(fine.case.scene)
+    shared = "; of what hangs, half of the target is asked for" if strict < 1.0 else ""
     few = f"; {facets:.0f} facets touch" if facets == facets else ""
-    trusted = within(between, wish) and not hangs(fine.case.scene)
+    trusted = within(between, wish, SHARE * strict)
     return Verdict(scene, trusted, f"two meshes ({nodes}) differ by {' and '.join(parts)}{few}{shared}")
 
 
-def hangs(scene: Scene) -> bool:
-    """Whether its organ hangs by an outline, where neighbouring meshes share their error: of six random spleens four
-    were beyond the target while two graded meshes agreed. How often two adaptive ones do was not measured."""
-    return load_of(scene) == "sag"
+def strictness(scene: Scene) -> float:
+    """What of the target two meshes may differ by: half of it where the organ hangs by an outline, since both lack the
+    same there. Of six random spleens two had adaptive bodies beyond the target, by 0.05 and 0.29 %, that differed by
+    0.64 and 0.86 of it from the coarser ones (docs/population.md)."""
+    return 0.5 if load_of(scene) == "sag" else 1.0
 
 
 def within(between: Apart, wish: Wish, share: float = SHARE) -> bool:
