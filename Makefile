@@ -2,7 +2,8 @@
 BIN := .venv/bin
 # A file stays with one process: kernels that only it needs are compiled once. tests/conftest.py orders the files.
 # Two processes fill two cores: threads of the linear algebra would only wait for each other.
-PYTEST := OMP_NUM_THREADS=1 $(BIN)/python -m pytest -q -n 2 --dist loadfile --no-loadscope-reorder
+# Modules are compiled once and not by every process that a test starts, whatever the environment says.
+PYTEST := PYTHONDONTWRITEBYTECODE= OMP_NUM_THREADS=1 $(BIN)/python -m pytest -q -n 2 --dist loadfile --no-loadscope-reorder
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
@@ -122,7 +123,7 @@ distclean: clean ## clean, and remove .venv and the raw results too (charts and 
 
 # Two processes that share what they compile, before two that would both compile it; says nothing when it is there.
 compiled: setup-run
-	@$(BIN)/python -m studies.sweep.compiling.main
+	@PYTHONDONTWRITEBYTECODE= $(BIN)/python -m studies.sweep.compiling.main
 
 compiled-essential: setup-run
 	@$(BIN)/python -m studies.sweep.compiling.main --essential

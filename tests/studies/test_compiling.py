@@ -59,6 +59,15 @@ def test_the_shared_kernels_come_first_and_the_reference_beside_them():
     assert len(set(names)) == len(names) == len(variants()) + sum(name.startswith("reference") for name in names)
 
 
+def test_a_loop_is_compiled_before_another_method_asks_for_it():
+    """Next to each other, two processes would both compile the loop of a family."""
+    names = [variant.name for variant in variants()]
+    for option in ("", ", thin probe"):
+        for one, other in (("shake", "projection"), ("penalty", "pressure")):
+            first, second = (names.index(f"{name}, whole, float64{option}") for name in (one, other))
+            assert second - first > 2
+
+
 def test_what_is_essential_is_what_the_main_studies_need():
     assert set(tasks.ESSENTIAL) <= set(tasks.tasks())
     needed = {(case.method.name, case.precision) for study in STUDIES if study.main for case in study.cases}

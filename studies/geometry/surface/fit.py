@@ -1,6 +1,7 @@
 """A surface mesh brought nearer to its shape where even nodes cut corners: thin margins, tips, the floor of folds."""
 
 from collections.abc import Sequence
+from functools import cached_property
 
 import numpy as np
 
@@ -75,8 +76,13 @@ class Fit:
         self.shape, self.regions, self.curved = shape, list(regions), curved
         self.points, self.triangles = surface
         self.outlines = self.find_outlines()
-        self.truth, self.from_truth = truth, SurfaceDistance(*truth)
+        self.truth = truth
         self.size = float(np.linalg.norm(np.ptp(truth[0], axis=0)))
+
+    @cached_property
+    def from_truth(self) -> SurfaceDistance:
+        """Distances to the true surface."""
+        return SurfaceDistance(*self.truth)
 
     def deviation(self) -> float:
         """Largest distance between the surface and its shape, in either direction, over the size [1]."""
@@ -101,7 +107,7 @@ class Fit:
         """Places (m, 3) [m] on the true surface and their distances (m,) [m] to this one, and the reverse."""
         places, pieces = along_facets(*with_middles(self.shape, self.points, self.triangles, self.regions, self.curved))
         samples = self.truth[0]
-        return (samples, SurfaceDistance(places, pieces)(samples)), (places, self.from_truth(places))
+        return (samples, SurfaceDistance(places, pieces)(samples)), (places, self.from_truth.again(places))
 
     def grow(self, nodes: int) -> None:
         """Adds nodes until there are `nodes`, or until none of the farthest places takes one."""

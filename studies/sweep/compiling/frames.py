@@ -54,11 +54,17 @@ class Variant:
 def variants() -> list[Variant]:
     """All: plain ones first, they compile the kernels that the others share; last the bodies that share their types.
 
-    Two processes that do neighbours at once would otherwise both compile the same.
+    Two processes that do neighbours at once would otherwise both compile the same. So the first variant of each family
+    comes before the second of any.
     """
     methods = (*(method() for method in (*METHODS, *LITERATURE)), *VARIANTS)
     found = [variant for method in methods for variant in variants_of(method)]
-    return sorted(found, key=lambda one: (one.kind not in OWN_TYPES, one.option != PLAIN, _rank(one.method)))
+    found.sort(key=lambda one: (one.kind not in OWN_TYPES, one.option != PLAIN, _rank(one.method)))
+    first: dict[tuple[str, ...], Variant] = {}
+    for one in found:
+        first.setdefault((family(one.method), one.precision, one.option), one)
+    begin = set(first.values())
+    return sorted(found, key=lambda one: (one.kind not in OWN_TYPES, one.option != PLAIN, one not in begin))
 
 
 def variants_of(method: Method) -> Iterator[Variant]:
@@ -76,6 +82,14 @@ def variants_of(method: Method) -> Iterator[Variant]:
             for option, yes in supported.items() if own else ():
                 if yes and (precision == "float64" or (option == THREADS and kind == "whole")):
                     yield Variant(method, kind, precision, option)
+
+
+def family(method: Method) -> str:
+    """Equal for methods that one compiled loop advances: its module in massspring.methods.families, else theirs."""
+    advance = type(method).advance
+    used = [advance.__globals__.get(name) for name in advance.__code__.co_names]
+    modules = [getattr(one, "__module__", None) or "" for one in used]
+    return next((module for module in modules if ".families." in module), type(method).__module__)
 
 
 def _rank(method: Method) -> int:

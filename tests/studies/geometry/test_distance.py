@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy.spatial import KDTree
 
 from studies.geometry import ball
-from studies.geometry.surface.distance import distance_to_surface, hausdorff
+from studies.geometry.surface.distance import SurfaceDistance, distance_to_surface, hausdorff
 from tests.studies.tiny import cube
 
 TRIANGLE = np.array([[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [0.0, 3.0, 0.0]])
@@ -108,3 +108,16 @@ def test_shifted_planes_and_symmetry():
     # Seen from one side alone the spike would be missed: its length is what both orders must give.
     assert ways[0] == ways[1] == pytest.approx(0.5 * np.linalg.norm([0.05] * 3), rel=1e-12)
     assert distance_to_surface(points[np.unique(triangles)], spike, triangles).max() < 0.5 * ways[0]
+
+
+def test_what_was_asked_for_before_is_not_measured_again(monkeypatch):
+    """Nor mistaken for its neighbour by one rounding."""
+    points, triangles, _ = cube()
+    surface, measured, measure = SurfaceDistance(points, triangles), [], SurfaceDistance.__call__
+    queries = np.random.default_rng(2).uniform(-1.0, 2.0, (60, 3))
+    monkeypatch.setattr(SurfaceDistance, "__call__", lambda self, q: measured.append(len(q)) or measure(self, q))
+    moved = queries.copy()
+    moved[::3, 1] = np.nextafter(moved[::3, 1], 9.0)
+    for asked in (queries, moved, moved, queries):
+        np.testing.assert_array_equal(surface.again(asked), measure(SurfaceDistance(points, triangles), asked))
+    assert measured == [60, 20, 20]
