@@ -12,6 +12,7 @@ from reference_fem.elements.shapes import edge_index
 from studies.geometry.mesh.organ_mesh import boundary_triangles, unique_edges
 from studies.meshing.nested_mesh import base_mesh
 from studies.meshing.opened_mesh import opened_elements
+from studies.reference.adaptive_mesh import coarse_mesh, indicator_of
 from studies.reference.load import load_reference
 from studies.reference.nested import path_of, problems_of
 from studies.reference.problem import problem_on
@@ -26,7 +27,7 @@ PLAN = ReferencePlan(base=100, at_contact=0, most=6e3, variants=("kappa",))
 FULL = Lumen(filling=Ramp((0.0, 0.7), (1.0, 1.15)))
 PULLED = replace(SHELL_OPENED, lumen=FULL, reference=PLAN)
 """Filled and pulled, then opened and pulled on."""
-STILL = replace(PULLED, held=tuple(replace(held, path=Held(held.name, held.region).path) for held in PULLED.held))
+STILL = replace(PULLED, held=tuple(Held(held.name, held.region) for held in PULLED.held))
 """The same with both caps at rest."""
 
 
@@ -110,6 +111,16 @@ def test_it_ends_as_one_that_was_never_filled(mesh, path):
     never = path_of(drained, problems_of(drained))
     assert abs(path[0].held_force[1, 2] / never[0].held_force[1, 2] - 1) > 0.1
     np.testing.assert_allclose(path[-1].u, never[-1].u, atol=1e-9 * RADIUS)
+
+
+def test_elements_adapt_to_the_opened_wall_without_its_content(mesh_cache):
+    """Those of a filled wall that is opened are those of one that was never filled."""
+    made, coarse = coarse_mesh(PULLED, 400)
+    indicator = indicator_of(PULLED, made, coarse)
+    never = indicator_of(replace(PULLED, lumen=Lumen("open")), made, coarse)
+    np.testing.assert_allclose(indicator, never, atol=1e-9)
+    closed = indicator_of(replace(PULLED, cuts=()), made, coarse)
+    assert np.abs(indicator - closed).max() > 0.1
 
 
 def sphere_pressure(filling: float, mu: float) -> float:
