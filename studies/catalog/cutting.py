@@ -24,7 +24,14 @@ UNFORESEEN = tuple(replace(body, cut=VIRTUAL) for body in BODIES if body.kind ==
 """The same on meshes that do not know the cut."""
 ADVANCING = BODIES[1], BODIES[3], BODIES[5]
 """Of scenes whose cut advances: with one volume elements turn over next to the tip."""
-WALLS = BodyRecipe(nodes=400), BodyRecipe(nodes=400, law="cotangent", volumes="nodal")
+WALLS = (
+    BodyRecipe(nodes=400),
+    BodyRecipe(nodes=400, law="cotangent", volumes="nodal"),
+    BodyRecipe(nodes=700),
+    BodyRecipe("quadratic", nodes=994, mass="stiffness"),
+    BodyRecipe("quadratic", nodes=994, graded="adaptive", mass="stiffness"),
+    BodyRecipe("quadratic", nodes=1194, graded="adaptive", mass="stiffness"),
+)
 """Of hollow organs."""
 LONG = 0.8
 """Of the stability limit."""

@@ -121,9 +121,11 @@ class NestedMesh:
         errors = [100.0 * abs(area_error(self.scene.organ, held, self.points, some)) for held, some in pairs]
         return max((error for error in errors if error == error), default=0.0)
 
-    @property
-    def lumen(self) -> np.ndarray:
-        """Middles of the corners of the lumen's facets [m], (f, 3)."""
+    def lumen_at(self, t: float) -> np.ndarray | None:
+        """Middles of the corners of the facets of a filled lumen [m], (f, 3); None where none is filled at time t [s]:
+        a cut lets the content go."""
+        if not self.scene.filled_at(t):
+            return None
         return nodes(self.mesh)[self.body.facets(self.mesh)[-1][:, :3]].mean(axis=1)
 
     def finer(self, indicator: np.ndarray, elements: int) -> tuple["NestedMesh", np.ndarray]:

@@ -95,7 +95,7 @@ def opened_mesh(mesh: OrganMesh | QuadraticMesh, along: Mapping[str, np.ndarray]
         "cuts": {},
     }
     if isinstance(mesh, QuadraticMesh):
-        made = replace(mesh, cells=number[after], facets=number[boundary], **same)
+        made = replace(mesh, cells=number[after], facets=number[boundary], lumen=mesh.lumen[:0], **same)
     else:
         made = replace(mesh, tetrahedra=number[after], triangles=number[boundary], **same)
     return Opened(made, parent, number[opening.pairs])

@@ -11,7 +11,7 @@ from studies.base.lookup import lookup
 from studies.geometry import CurvedMesh, true_shape_of
 from studies.geometry.mesh.jacobian import PAIRS
 from studies.geometry.organs import SHAPES
-from studies.geometry.shape.levelset import Shape, project
+from studies.geometry.shape.levelset import Shape, at_depth, project
 from studies.meshing.held_mesh import HeldMesh, rim_sides
 from studies.scene.cut import Cut
 from studies.scene.organ_file import remeshed, scanned
@@ -53,20 +53,24 @@ def on_true_shape(
 
 
 def in_cut_planes(points: np.ndarray, body: HeldMesh, shape: Shape, cuts: tuple[Cut, ...]) -> np.ndarray:
-    """P2 nodes at `points` (n, 3) [m] with those of the faces of each cut in its plane, those of its trace also on the
-    true surface: a side that follows the surface alone leaves the plane, and so do those that smoothing bends."""
+    """P2 nodes at `points` (n, 3) [m] with those of the faces of each cut in its plane, those of its traces also on the
+    true surface, outer or of the lumen: a side that follows the surface alone leaves the plane, and so do those that
+    smoothing bends."""
     if not cuts:
         return points
     mesh, points = MeshTet2.from_mesh(body.mesh), points.copy()
+    lumen = body.facets(mesh)[-1][:, :3]
     for cut, faces in zip(cuts, body.faces_of_cuts, strict=True):
         sides = np.unique(np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1), axis=0).reshape(-1, 2)
-        _, outside = body.rim(faces)
-        flat, trace = (
+        _, rim = body.rim(faces)
+        inner = np.isin(rim, lumen).all(axis=1)
+        flat, outside, inside = (
             np.concatenate([np.unique(vertices), mesh.nvertices + edge_index(mesh, ends)])
-            for vertices, ends in ((faces, sides), (outside, outside))
+            for vertices, ends in ((faces, sides), (rim[~inner],) * 2, (rim[inner],) * 2)
         )
         points[flat] -= np.outer(cut.plane.level(points[flat]), cut.unit_normal)
-        points[trace] = project(shape, points[trace], (cut.plane.level,))
+        for trace, surface in ((outside, shape), (inside, at_depth(shape, shape.wall or 0.0))):
+            points[trace] = project(surface, points[trace], (cut.plane.level,))
     return points
 
 

@@ -5,6 +5,7 @@ Halvings set by hand leave the error to the luck of a mesh: few facets in a cont
 to where it is held that turns the whole organ (docs/accuracy.md).
 """
 
+import math
 import warnings
 from dataclasses import replace
 
@@ -119,7 +120,7 @@ def indicators_of(scene: Scene, organ_mesh: OrganMesh, coarse: HeldMesh) -> tupl
         if scene.cuts:  # the front of a cut strains what is around it
             mesh, parent = opened_elements(mesh, coarse.cut_faces)
             patches = [np.flatnonzero(np.isin(parent, patch)) for patch in patches]
-        problem = problem_on(scene, mesh, patches, middle)
+        problem = problem_on(scene, mesh, patches, middle if scene.filled_at(math.inf) else None)
         ends = list[Checkpoint]()
         equilibrium_path(problem, scene.checkpoints[-1:] or (scene.duration,), LOOSE, on_checkpoint=ends.append)
     except SolveError as error:

@@ -155,7 +155,7 @@ def path_of(
 def problem_of(mesh: NestedMesh) -> Problem:
     """The scene on one of its nested meshes, opened if it is cut. Raises StudyError where a cut comes last."""
     check_judged_after_cut(mesh.scene)
-    return problem_on(mesh.scene, mesh.solved, mesh.patches, mesh.lumen)
+    return problem_on(mesh.scene, mesh.solved, mesh.patches, mesh.lumen_at(math.inf))
 
 
 def problems_of(mesh: NestedMesh) -> list[Work]:
@@ -170,7 +170,7 @@ def problems_of(mesh: NestedMesh) -> list[Work]:
         problem = after
         if count < len(scene.cuts):
             opened, parent = mesh.opened_until(times[0])
-            problem = problem_on(scene, opened, mesh.held_in(parent), mesh.lumen)
+            problem = problem_on(scene, opened, mesh.held_in(parent), mesh.lumen_at(times[0]))
         work.append((problem, times, NewtonSettings()))
     return work
 

@@ -31,9 +31,9 @@ def reference_problem(scene: Scene, level: float) -> Problem:
     return problem_on(scene, *reference_mesh(scene, level))
 
 
-def problem_on(scene: Scene, mesh: MeshTet2, patches: list[np.ndarray], lumen: np.ndarray) -> Problem:
+def problem_on(scene: Scene, mesh: MeshTet2, patches: list[np.ndarray], lumen: np.ndarray | None) -> Problem:
     """The scene on a second-order mesh, with the nodes of each held region and the middles of the corners of the
-    lumen's facets [m], (f, 3). Raises StudyError."""
+    lumen's facets [m], (f, 3); None where nothing fills it, as after a cut that opened it. Raises StudyError."""
     tissue = scene.tissue
     return Problem(
         mesh=mesh,
@@ -42,7 +42,7 @@ def problem_on(scene: Scene, mesh: MeshTet2, patches: list[np.ndarray], lumen: n
         obstacles=tuple(rigid(o) for o in kept_obstacles(scene)),
         gravity=scene.gravity,
         density=tissue.density,
-        cavities=(_cavity(scene, lumen),) if scene.filled else (),
+        cavities=(_cavity(scene, lumen),) if scene.filled and lumen is not None else (),
         faces_touch=any(cut.contact for cut in scene.cuts),
     )
 

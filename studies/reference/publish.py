@@ -38,8 +38,10 @@ def finer(scene: Scene, most: float = MOST) -> Scene:
 
 def judged_scenes() -> dict[str, Scene]:
     """Scenes of the catalogue whose reference is published, by name: all that have one, but those in which the faces of
-    a cut touch, and those with several cuts."""
-    opened = [scene for scene in CUT if len(scene.cuts) == 1 and not scene.cuts[0].contact]
+    a cut touch, those with several cuts, and those whose cut opens a lumen."""
+    opened = [
+        scene for scene in CUT if len(scene.cuts) == 1 and not (scene.cuts[0].contact or scene.cuts[0].opens_lumen)
+    ]
     return {scene.name: scene for scene in (*JUDGED, *opened) if scene.reference is not None}
 
 

@@ -94,10 +94,10 @@ def check_opens(scene: Scene, recipe: BodyRecipe) -> None:
     cut = next((cut for cut in scene.cuts if cut.opens_lumen), None)
     if cut is None:
         return
-    if recipe.kind != "tetrahedral" or recipe.graded:
-        kind = "graded" if recipe.graded else recipe.kind
+    if recipe.kind not in ("tetrahedral", "quadratic"):
         raise StudyError(
-            f"cut '{cut.name}' opens a lumen, which a {kind} body cannot do yet; take an even tetrahedral one"
+            f"cut '{cut.name}' opens a lumen, which a {recipe.kind} body cannot do yet; take a tetrahedral or a "
+            "quadratic one"
         )
     if scene.filled and recipe.volumes == "whole":
         raise StudyError(
@@ -161,6 +161,10 @@ def check_virtual(scene: Scene) -> None:
         raise DoesNotApply(
             f"virtual nodes do not apply to scene '{scene.name}', whose cut advances; leave until out, or take cut "
             "'conforming'"
+        )
+    if scene.cut.opens_lumen:
+        raise DoesNotApply(
+            f"virtual nodes do not apply to scene '{scene.name}', whose cut opens a lumen; take cut 'conforming'"
         )
     if scene.cut.contact:
         raise DoesNotApply(

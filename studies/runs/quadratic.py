@@ -17,12 +17,12 @@ def check_masses(scene: Scene, recipe: BodyRecipe) -> None:
 
 
 def quadratic_for(scene: Scene, recipe: BodyRecipe, mesh: QuadraticMesh) -> Body:
-    """The body of quadratic tetrahedra with one volume per vertex, and one for a lumen that is filled.
+    """The body of quadratic tetrahedra with one volume per vertex, and one for a lumen that is filled and closed.
 
     Raises MassSpringError for a mesh that makes no body.
     """
     material = Material(recipe.stiffness * scene.tissue.shear_modulus, scene.tissue.density)
-    lumen = mesh.lumen if scene.filled else None
+    lumen = mesh.lumen if scene.filled and mesh.hollow else None
     return quadratic_body(mesh.points, mesh.cells, material, lumen, recipe.mass, recipe.contact)
 
 

@@ -42,8 +42,6 @@ def _check_wall(scene: Scene, cut: Cut) -> None:
         raise StudyError(f"{name} is a disc inside the body, and the organ is hollow; give a half space as blade")
     if cut.contact:
         raise StudyError(f"{name} has faces that touch, which no cut through a wall has yet; leave out contact")
-    if scene.reference is not None:
-        raise StudyError(f"{name} opens a lumen, which the reference cannot do yet; give the scene none")
 
 
 def check_cuts(scene: Scene, surface: tuple[np.ndarray, np.ndarray]) -> None:

@@ -208,6 +208,10 @@ class Scene:
         """Whether a lumen's content pushes back."""
         return self.lumen is not None and self.lumen.content == "closed"
 
+    def filled_at(self, t: float) -> bool:
+        """Whether it still does at time t [s]: no cut has opened the lumen before."""
+        return self.filled and not any(cut.opens_lumen and cut.at < t for cut in self.cuts)
+
     @property
     def symmetric(self) -> bool:
         """Whether the reference is an octant, mirrored at the three coordinate planes."""

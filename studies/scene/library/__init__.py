@@ -16,6 +16,7 @@ from studies.scene.library.liver_press import LIVER_PRESS
 from studies.scene.library.liver_probe import LIVER_PROBE
 from studies.scene.library.shell_opened import SHELL_OPENED
 from studies.scene.library.spleen_sag import SPLEEN_SAG
+from studies.scene.library.stomach_opened import STOMACH_OPENED
 from studies.scene.library.stomach_press import STOMACH_PRESS
 from studies.scene.library.stomach_probe import STOMACH_PROBE
 from studies.scene.library.stomach_slide import STOMACH_SLIDE
@@ -49,6 +50,7 @@ CUT: tuple[Scene, ...] = (
     BALL_CUT_PRESSED,
     KIDNEY_BISECTED,
     SHELL_OPENED,
+    STOMACH_OPENED,
 )
 """Scenes that cut their organ. They are not in SCENES: surface bodies cannot run those with a front inside the organ,
 and half of the methods none of them."""
@@ -73,6 +75,7 @@ __all__ = [
     "SCENES",
     "SHELL_OPENED",
     "SPLEEN_SAG",
+    "STOMACH_OPENED",
     "STOMACH_PRESS",
     "STOMACH_PROBE",
     "STOMACH_SLIDE",

@@ -15,6 +15,4 @@ SHELL_OPENED = replace(
     organ=Organ("ball", {"radius": RADIUS, "wall": WALL}),
     lumen=Lumen(),
     cuts=(Cut("opening", MIDDLE, HALF, at=CUT_AT, opens_lumen=True),),
-    reference=None,  # which does not open lumens yet
-    quantities=("volume",),
 )

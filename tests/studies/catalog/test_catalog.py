@@ -7,7 +7,7 @@ import pytest
 from massspring import LITERATURE
 from studies.base.errors import DoesNotApply, StudyError
 from studies.catalog import STUDIES
-from studies.catalog.study import SMOKE_FRAMES, SMOKE_NODES, SMOKE_NODES_HOLLOW, SMOKE_QUADRATIC
+from studies.catalog.study import SMOKE_FRAMES, SMOKE_NODES, SMOKE_NODES_CUT, SMOKE_NODES_HOLLOW, SMOKE_QUADRATIC
 from studies.metrics.table import metric
 from studies.runs.prepare import prepare
 from studies.store.paths import readable
@@ -73,8 +73,8 @@ def test_smoke_is_small_and_still_the_same_question(study):
     assert {case.scene.name for case in smoke.cases} == {case.scene.name for case in study.cases}
     assert {case.timed for case in smoke.cases} == {case.timed for case in study.cases}
     for case in smoke.cases:
-        few = SMOKE_QUADRATIC if case.body.kind == "quadratic" else (SMOKE_NODES, SMOKE_NODES_HOLLOW)
-        assert case.body.nodes <= few[case.scene.lumen is not None]
+        few = SMOKE_QUADRATIC if case.body.kind == "quadratic" else (SMOKE_NODES, SMOKE_NODES_CUT, SMOKE_NODES_HOLLOW)
+        assert case.body.nodes <= few[2 if case.scene.lumen is not None else 1 if case.scene.cuts else 0]
         assert case.frames <= SMOKE_FRAMES
         plan = case.scene.reference
         assert plan is None or plan.variants == ()

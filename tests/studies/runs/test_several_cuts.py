@@ -128,7 +128,7 @@ def test_the_reference_opens_one_cut_after_the_other(judged):
     mesh = base_mesh(replace(BALL_CUT_TWICE, checkpoints=(SECOND_AT, 4.0)), 150, 0)
     found = path_of(mesh, problems_of(mesh))
     opened, parent = opened_elements(mesh.mesh, mesh.body.faces_of_cuts[0])
-    (truth,) = equilibrium_path(problem_on(mesh.scene, opened, mesh.held_in(parent), mesh.lumen), (SECOND_AT,))[-1:]
+    (truth,) = equilibrium_path(problem_on(mesh.scene, opened, mesh.held_in(parent), None), (SECOND_AT,))[-1:]
     assert found[0].held_force == pytest.approx(truth.held_force, rel=1e-9, abs=1e-9)
     where = {tuple(place): u for place, u in zip(nodes(opened), truth.u, strict=True)}
     single = [k for k, place in enumerate(nodes(mesh.solved)) if abs(abs(place[2]) - AWAY * RADIUS) > 1e-9]

@@ -59,7 +59,7 @@ def test_the_reference_of_a_ball_whose_cut_is_pressed_shut_is_that_of_the_ball()
     mesh = base_mesh(STRAIGHT, 150, 0)
     opened = problem_of(mesh)
     patches = [np.unique(facets) for facets in mesh.body.facets(mesh.mesh)[:-1]]
-    whole = problem_on(replace(STRAIGHT, cuts=()), mesh.mesh, patches, mesh.lumen)
+    whole = problem_on(replace(STRAIGHT, cuts=()), mesh.mesh, patches, None)
     cut, uncut = (equilibrium_path(problem, (STRAIGHT.duration,))[-1] for problem in (opened, whole))
     assert cut.held_force[1, 2] == pytest.approx(uncut.held_force[1, 2], rel=1e-2)
     both = mesh._opened[1]
