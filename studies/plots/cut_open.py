@@ -19,6 +19,8 @@ from studies.plots.style.style import NORMAL, SMALL, drawing, styled
 TITLE = "Incised organs"
 CAMERAS = {
     "ball_incised": Camera(azimuth=-152.0, elevation=16.0),
+    "ball_cut_twice": Camera(azimuth=-152.0, elevation=16.0),
+    "shell_opened": Camera(azimuth=-152.0, elevation=16.0),
     "liver_incised": Camera(azimuth=-60.0, elevation=38.0),
     "liver_cut_live": Camera(azimuth=-60.0, elevation=38.0),
 }
@@ -27,6 +29,8 @@ TISSUE, STEEL, INSIDE = "#D9B3A6", "#A9A9A9", "#8C2F39"
 SIZE = (3.5, 3.0)
 """Of a panel [inch]."""
 DPI = 150
+LEAST_NEWTONS = 0.1
+"""Smaller forces are written in mN."""
 
 
 def incised(run: Run) -> bool:
@@ -79,14 +83,20 @@ def _draw_row(row: Sequence[Axes], run: Run, camera: Camera) -> None:
     )
     off = f"{force_end(run):+.1f} %".replace("-", "−")
     words = (
-        (f"{heading(run.case.scene.name)}, before", f"force {run.force[at[0]]:.2f} N"),
-        ("cut and pulled", f"gapes {gap:.1f} mm, force {run.force[at[-1]]:.2f} N ({off})"),
-        ("reference", f"gapes {truth:.1f} mm, force {force[-1]:.2f} N"),
+        (f"{heading(run.case.scene.name)}, before", f"force {in_newtons(run.force[at[0]])}"),
+        ("cut and pulled", f"gapes {gap:.1f} mm, force {in_newtons(run.force[at[-1]])} ({off})"),
+        ("reference", f"gapes {truth:.1f} mm, force {in_newtons(force[-1])}"),
     )
     for axes, (title, line) in zip(row, words, strict=True):
         axes.set_title(f"{title}\n{line}", size=NORMAL, weight="normal")
     left, below = low - 0.5 * room
     scale_bar(row[0], left, below, 0.05, "50 mm", size=SMALL)
+
+
+def in_newtons(force: float) -> str:
+    """A force [N] in the unit in which it has digits."""
+    value, unit = (force, "N") if abs(force) >= LEAST_NEWTONS else (1e3 * force, "mN")
+    return f"{value:.2f} {unit}".replace("-", "−")
 
 
 draw = drawing(figure, DPI)

@@ -12,7 +12,7 @@ from reference_fem.elements.shapes import edge_index
 from studies.geometry.mesh.organ_mesh import boundary_triangles, unique_edges
 from studies.meshing.nested_mesh import base_mesh
 from studies.meshing.opened_mesh import opened_elements
-from studies.reference.adaptive_mesh import coarse_mesh, indicator_of
+from studies.reference.adaptive_mesh import coarse_mesh, indicators_of
 from studies.reference.load import load_reference
 from studies.reference.nested import path_of, problems_of
 from studies.reference.problem import problem_on
@@ -116,10 +116,10 @@ def test_it_ends_as_one_that_was_never_filled(mesh, path):
 def test_elements_adapt_to_the_opened_wall_without_its_content(mesh_cache):
     """Those of a filled wall that is opened are those of one that was never filled."""
     made, coarse = coarse_mesh(PULLED, 400)
-    indicator = indicator_of(PULLED, made, coarse)
-    never = indicator_of(replace(PULLED, lumen=Lumen("open")), made, coarse)
+    indicator, _ = indicators_of(PULLED, made, coarse)
+    never, _ = indicators_of(replace(PULLED, lumen=Lumen("open")), made, coarse)
     np.testing.assert_allclose(indicator, never, atol=1e-9)
-    closed = indicator_of(replace(PULLED, cuts=()), made, coarse)
+    closed, _ = indicators_of(replace(PULLED, cuts=()), made, coarse)
     assert np.abs(indicator - closed).max() > 0.1
 
 

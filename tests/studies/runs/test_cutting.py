@@ -109,6 +109,11 @@ def test_the_picture_shows_the_faces_of_the_cut_and_how_wide_they_gape(incised):
         assert triangle_areas(points, triangles[inside]).sum() == pytest.approx(np.pi * 0.05**2, rel=0.03)
 
 
+@pytest.mark.parametrize(("force", "words"), [(1.95, "1.95 N"), (-0.3, "−0.30 N"), (0.0412, "41.20 mN")])
+def test_forces_in_the_picture_have_digits(force, words):
+    assert cut_open.in_newtons(force) == words
+
+
 def test_the_chart_of_pieces_shows_each_and_their_sum():
     run = Run(case := Case(BALL_BISECTED, ONE, ImplicitVolume(), dt_fraction=0.8), measure(case))
     (axes,) = pieces.figure([run]).axes
