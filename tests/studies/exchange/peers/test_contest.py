@@ -130,7 +130,6 @@ REFUSED = {
     "a sphere": (LIVER_PROBE, "knows frictionless planes, not: Rigid sphere"),
     "friction": (replace(BALL_SQUEEZE, obstacles=(Plane((0, 0, 0.05), (0, 0, -1), friction=0.3),)), "coefficient 0.3"),
     "a lumen": (STOMACH_PRESS, "knows solid organs"),
-    "moving caps": (BALL_CLAMPED, "held regions that do not move"),
 }
 
 
