@@ -9,6 +9,7 @@ holds is held at three nodes so that it cannot turn or drift, which takes no for
 # pyright: reportMissingImports=false
 
 import time
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +29,8 @@ INCREMENTS = 2
 """Load steps between two checkpoints."""
 PENALTY = 2000.0
 """Pressure over depth, times the size of the body, over the shear modulus: depths of less than 0.1 % of the size."""
+HALVINGS = 3
+"""Of a load step that does not converge, at most."""
 WIDE = 1.0
 """Half the edge of a plane [m]."""
 
@@ -122,9 +125,21 @@ class Body:
                 across = np.linalg.svd(normal[None])[2][1:]
                 corners = [a * across[0] + b * across[1] for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
                 contact.cp = ContactPlane(place(one, t), normal, place(one, t) + WIDE * np.array(corners))
-        self.state = self.problem.solve(state0=self.state, save_results=False)()
+        state = self.problem.solve(state0=self.state, save_results=False)()
         if self.status["condition"] != 0:
             raise RuntimeError(f"Newton's method does not converge at t = {t:g} s")
+        self.state = state
+
+    def advance(self, before: float, now: float, halvings: int = HALVINGS) -> None:
+        """From the equilibrium at a time to that at another [s], in halves where that fails. Raises RuntimeError."""
+        try:
+            self.step(now)
+        except RuntimeError:
+            if halvings == 0:
+                raise
+            middle = 0.5 * (before + now)
+            self.advance(before, middle, halvings - 1)
+            self.advance(middle, now, halvings - 1)
 
     def positions(self) -> np.ndarray:
         """Of all nodes [m], (n, 3)."""
@@ -155,8 +170,8 @@ def run(
     body, many = Body(scene, penalty), round(increments / shorter)
     positions, forces = [scene.points], [0.0]
     for before, now in zip(scene.times[:-1], scene.times[1:], strict=True):
-        for t in np.linspace(before, now, many + 1)[1:]:
-            body.step(float(t))
+        for begin, end in pairwise(np.linspace(before, now, many + 1).tolist()):
+            body.advance(begin, end)
         positions.append(body.positions())
         forces.append(body.force())
     spent = time.process_time() - started

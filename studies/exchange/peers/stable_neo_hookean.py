@@ -54,7 +54,10 @@ class Tetrahedra(ABC):
 
 
 class StableNeoHookean(Tetrahedra):
-    """Psi = m/2 (I - 3) - m/2 ln(I + 1) + k/2 (J - 1 - 3m/4k)², of Bullet and Drake: Smith, de Goes and Kim 2018, Section 3.4."""
+    """Psi = m/2 (I - 3) - m/2 ln(I + 1) + k/2 (J - 1 - 3m/4k)², of Bullet and Drake.
+
+    Smith, de Goes and Kim 2018, Section 3.4.
+    """
 
     def _set_constants(self, mu: float, lam: float) -> None:
         self.m, self.k = 4.0 / 3.0 * mu, lam + 5.0 / 6.0 * mu
