@@ -56,7 +56,12 @@ ADAPTERS = "studies.exchange.peers."
 PEERS: tuple[Peer, ...] = (
     Peer("mujoco", ADAPTERS + "mujoco_flex", packages=("mujoco-core==4.0.1",), settings={"poisson": 0.3}),
     Peer("felupe", ADAPTERS + "felupe_quadratic", "curved", packages=("felupe==11.3.0", "pypardiso")),
-    Peer("newton", ADAPTERS + "newton_vbd", packages=("newton==1.8.0", "warp-lang==1.19.0"), settings={"lame": 1.5}),
+    Peer(
+        "newton",
+        ADAPTERS + "newton_vbd",
+        packages=("newton==1.8.0", "warp-lang==1.19.0"),
+        settings={"lame": 1.5},
+    ),
     Peer("bullet", ADAPTERS + "bullet", packages=("pybullet==3.2.7",), settings={"lame": 1.5}),
     Peer("drake", ADAPTERS + "drake_deformable", packages=("drake==1.51.1",), settings={"poisson": 0.3}),
     Peer("sfepy", ADAPTERS + "sfepy_mixed", packages=("sfepy==2026.3",)),

@@ -39,7 +39,7 @@ XML = """<mujoco>
 
 def model_of(scene: SceneFolder, dt: float, poisson: float, stiff: float) -> mujoco.MjModel:
     """The scene as MuJoCo's model. Raises CannotDo."""
-    scene.check_simple()
+    scene.check_simple(masses=True)
     contact = f'condim="1" friction="0 0 0" solref="{stiff * dt} 1"'
     shapes = "\n".join(
         f'<body name="obstacle{k}" mocap="true" pos="{_text(place(o, 0.0))}"><geom {_shape(o)} {contact}/></body>'
@@ -67,6 +67,7 @@ def model_of(scene: SceneFolder, dt: float, poisson: float, stiff: float) -> muj
 def _set_masses(model: mujoco.MjModel, scene: SceneFolder, volumes: np.ndarray) -> None:
     """A quarter of each tetrahedron at its corners, where MuJoCo shares the mass evenly; and the scene's damping."""
     mass = np.bincount(scene.cells.ravel(), np.repeat(volumes / 4.0, 4), len(scene.points)) * scene.density
+    mass += scene.hung
     model.dof_damping[_freedoms(model)] = scene.data["damping"]["rate"] * mass[:, None]
     mass[scene.held] *= HEAVY
     model.body_mass[model.flex_vertbodyid] = mass

@@ -36,7 +36,7 @@ FORCES = 20
 
 def model_of(scene: SceneFolder, lame: float, penalty: float) -> tuple[Any, list[int]]:
     """The scene as Newton's model, and the numbers of its obstacles. Raises CannotDo."""
-    scene.check_simple()
+    scene.check_simple(masses=True)
     builder = newton.ModelBuilder(gravity=tuple(scene.data["gravity"]))
     config = newton.ModelBuilder.ShapeConfig(ke=penalty, kd=0.0, mu=0.0)
     shapes = [
@@ -58,6 +58,8 @@ def model_of(scene: SceneFolder, lame: float, penalty: float) -> tuple[Any, list
         k_damp=0.0,
         particle_radius=RADIUS,
     )
+    for node in np.flatnonzero(scene.hung).tolist():
+        builder.particle_mass[node] += float(scene.hung[node])
     for node in scene.held.tolist():
         builder.particle_mass[node] = 0.0
         builder.particle_flags[node] &= ~int(newton.ParticleFlags.ACTIVE)

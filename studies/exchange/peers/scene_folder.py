@@ -102,8 +102,19 @@ class SceneFolder:
         """The probed force [N] of a push on the body (3,) [N]."""
         return float(push @ np.array(self.data["force"]["direction"]))
 
-    def check_simple(self) -> None:
-        """Raises CannotDo for a lumen, a start in motion, and a cut whose faces touch."""
+    @property
+    def hung(self) -> np.ndarray:
+        """What hangs at every node beside its share of the tissue [kg], (n,): of the silicone beam alone."""
+        masses = np.zeros(len(self.points))
+        for entry in self.data.get("masses", ()):
+            masses[entry["node"]] += entry["mass"]
+        return masses
+
+    def check_simple(self, masses: bool = False) -> None:
+        """Raises CannotDo for a lumen, a start in motion, a cut whose faces touch and, unless `masses`, something that
+        hangs at nodes."""
+        if not masses and self.data.get("masses"):
+            raise CannotDo("its adapter hangs no masses at nodes")
         if self.data["lumen"] is not None:
             raise CannotDo("its adapter knows solid organs, not a wall round a lumen")
         if self.data["start"]["speed"] is not None:
