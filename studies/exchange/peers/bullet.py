@@ -62,7 +62,7 @@ class Deformable:
                 mass=self.scene.density * float(self.law.volume.sum()),
                 useNeoHookean=1,
                 NeoHookeanMu=self.law.m,
-                NeoHookeanLambda=self.law.l,
+                NeoHookeanLambda=self.law.k,
                 NeoHookeanDamping=self.damping,
                 useSelfCollision=0,
                 collisionMargin=MARGIN,

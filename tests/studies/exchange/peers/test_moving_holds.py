@@ -12,10 +12,10 @@ import pytest
 from studies.exchange.entry import entries_beside
 from studies.exchange.export import export
 from studies.exchange.peers.contest import PEERS, Attempt, contest
-from studies.exchange.peers.scene_folder import SceneFolder
+from studies.exchange.peers.scene_folder import SceneFolder, gap, moved
 from studies.metrics.table import study_table
 from studies.reference.load import reference_for
-from studies.scene.library import BALL_CLAMPED
+from studies.scene.library import BALL_CLAMPED, LIVER_PROBE
 from studies.store.record import Status
 from tests.studies.exchange.peers.test_contest import ENVIRONMENTS
 
@@ -101,3 +101,13 @@ def test_held_nodes_go_their_way(tmp_path, mesh_cache):
         assert given.held_at(t) == pytest.approx(np.concatenate(wanted), abs=1e-15)
     assert list(given.held) == list(np.concatenate(parts))
     assert given.along(np.array([1.0, 2.0, -3.0])) == pytest.approx(3.0)
+
+
+def test_the_probe_of_the_liver_starts_between_the_nodes_of_a_coarse_mesh(tmp_path, mesh_cache):
+    """docs/league.md: on liver_probe a program whose nodes alone touch feels nothing for the first third of the way."""
+    export(LIVER_PROBE, tmp_path / "scene", 150)
+    given = SceneFolder(tmp_path / "scene")
+    (sphere,) = given.obstacles("sphere")
+    way = np.linalg.norm(moved(sphere["path"], given.times[-1]))
+    nearest = gap(sphere, given.points[given.outer], 0.0)[0].min()
+    assert (1e3 * way, 1e3 * nearest) == pytest.approx((10.5, 3.9), abs=0.05)
