@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import pybullet  # pyright: ignore[reportMissingImports]
 
-from studies.exchange.peers.scene_folder import CannotDo, SceneFolder, gap, march, place, turn_to
+from studies.exchange.peers.scene_folder import CannotDo, SceneFolder, gap, march, moved, place, turn_to
 from studies.exchange.peers.stable_neo_hookean import StableNeoHookean
 from studies.exchange.peers.vtk_text import vtk_text
 
@@ -39,7 +39,7 @@ class Deformable:
         scene.check_simple()
         if np.any(scene.data["gravity"]):
             raise CannotDo("its adapter reads the force where there is no weight")
-        self.scene, self.obstacles, self.asked = scene, scene.obstacles("plane", "sphere"), scene.probed
+        self.scene, self.obstacles, self.asked = scene, scene.obstacles("plane", "sphere"), scene.asked_obstacle
         self.damping = damping
         pybullet.connect(pybullet.DIRECT)
         pybullet.resetSimulation(pybullet.RESET_USE_DEFORMABLE_WORLD)
@@ -50,8 +50,7 @@ class Deformable:
         self.bodies = [self._shape(one) for one in self.obstacles]
         awake = pybullet.ACTIVATION_STATE_DISABLE_SLEEPING  # the loads are slower than what it takes for rest
         pybullet.changeDynamics(self.organ, -1, activationState=awake)
-        for node in scene.held.tolist():
-            pybullet.createSoftBodyAnchor(self.organ, node, -1, -1)
+        self.holds = [self._hold(held) for held in scene.data["held"]]
 
     def _organ(self) -> int:
         with tempfile.TemporaryDirectory() as folder:
@@ -63,12 +62,22 @@ class Deformable:
                 mass=self.scene.density * float(self.law.volume.sum()),
                 useNeoHookean=1,
                 NeoHookeanMu=self.law.m,
-                NeoHookeanLambda=self.law.l,
+                NeoHookeanLambda=self.law.k,
                 NeoHookeanDamping=self.damping,
                 useSelfCollision=0,
                 collisionMargin=MARGIN,
                 frictionCoeff=0.0,
             )
+
+    def _hold(self, held: dict[str, Any]) -> tuple[dict[str, Any], int]:
+        """The path of a held region, and the body without a shape that its nodes are anchored to; -1 where it stays."""
+        body, nodes = -1, self.scene.marked(held["point_data"])
+        if np.any(held["path"]["displacements"]):
+            body = pybullet.createMultiBody(0.0)
+        for node in nodes.tolist():
+            at = () if body < 0 else (self.scene.points[node].tolist(),)
+            pybullet.createSoftBodyAnchor(self.organ, node, body, -1, *at)
+        return held["path"], body
 
     def _shape(self, obstacle: dict[str, Any]) -> int:
         """A sphere, or a box for a plane: its distance field knows no half-spaces."""
@@ -87,6 +96,9 @@ class Deformable:
             if one["kind"] == "plane":
                 middle, turn = middle - BOX * np.array(one["normal"]), turn_to(one["normal"]).tolist()
             pybullet.resetBasePositionAndOrientation(body, middle.tolist(), turn)
+        for path, body in self.holds:
+            if body >= 0:
+                pybullet.resetBasePositionAndOrientation(body, moved(path, t).tolist(), [0.0, 0.0, 0.0, 1.0])
         pybullet.stepSimulation()
 
     def positions(self) -> np.ndarray:
@@ -94,12 +106,13 @@ class Deformable:
         return np.array(pybullet.getMeshData(self.organ, -1, flags=pybullet.MESH_DATA_SIMULATION_MESH)[1])
 
     def force(self, t: float) -> float:
-        """The probed force [N] at time t [s]: what the elements push back at all free nodes that are nearer to the
-        asked obstacle than to any other. At rest only touched nodes push."""
-        x = self.positions()
-        nearest = np.argmin([gap(one, x, t)[0] for one in self.obstacles], axis=0)
-        free = np.setdiff1d(np.flatnonzero(nearest == self.asked), self.scene.held)
-        return -float(self.law.forces(x)[free].sum(axis=0) @ np.array(self.scene.data["force"]["direction"]))
+        """The probed force [N] at time t [s]: what the elements push back at the held region, or at all free nodes that
+        are nearer to the asked obstacle than to any other. At rest only touched nodes push."""
+        x, nodes = self.positions(), self.scene.asked_nodes
+        if self.asked is not None:
+            nearest = np.argmin([gap(one, x, t)[0] for one in self.obstacles], axis=0)
+            nodes = np.setdiff1d(np.flatnonzero(nearest == self.asked), self.scene.held)
+        return self.scene.along(-self.law.forces(x)[nodes].sum(axis=0))
 
 
 def run(

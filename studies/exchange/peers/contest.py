@@ -54,14 +54,22 @@ class Peer:
 
 ADAPTERS = "studies.exchange.peers."
 PEERS: tuple[Peer, ...] = (
-    Peer("mujoco", ADAPTERS + "mujoco_flex", packages=("mujoco-core==4.0.1",), settings={"poisson": 0.4}),
+    Peer("mujoco", ADAPTERS + "mujoco_flex", packages=("mujoco-core==4.0.1",), settings={"poisson": 0.3}),
     Peer("felupe", ADAPTERS + "felupe_quadratic", "curved", packages=("felupe==11.3.0", "pypardiso")),
-    Peer("newton", ADAPTERS + "newton_vbd", packages=("newton==1.8.0", "warp-lang==1.19.0")),
+    Peer(
+        "newton",
+        ADAPTERS + "newton_vbd",
+        packages=("newton==1.8.0", "warp-lang==1.19.0"),
+        settings={"lame": 1.5},
+    ),
     Peer("bullet", ADAPTERS + "bullet", packages=("pybullet==3.2.7",)),
-    Peer("drake", ADAPTERS + "drake_deformable", packages=("drake==1.51.1",), settings={"poisson": 0.45}),
+    Peer("drake", ADAPTERS + "drake_deformable", packages=("drake==1.51.1",), settings={"poisson": 0.3}),
     Peer("sfepy", ADAPTERS + "sfepy_mixed", packages=("sfepy==2026.3",)),
     Peer("sofa", absent="no wheel on PyPI; it comes as binaries of its own or by conda"),
-    Peer("genesis", absent="genesis-world 1.4.5 meshes a surface itself, and cannot take the tetrahedra of a scene"),
+    Peer(
+        "genesis",
+        absent="genesis-world 1.4.5 meshes a surface itself; tetrahedra of a scene can only be put into its inner code",
+    ),
     Peer("torch-fem", absent="torch-fem 0.14.0 has no contact"),
 )
 OURS: tuple[Peer, ...] = (

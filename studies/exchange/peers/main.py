@@ -47,8 +47,8 @@ def main(
     homes = environments or results / "cache" / "environments"
     with tempfile.TemporaryDirectory() as folder:
         if sweep:
-            rows: list[dict[str, Any]] = []
             table = results / FOLDER / TABLE
+            rows = kept_rows(table, [peer.name for peer in chosen])
             table.parent.mkdir(parents=True, exist_ok=True)
             for peer in chosen:
                 for row in () if peer.absent else swept(peer, Path(folder), limit, homes):
@@ -69,6 +69,13 @@ def main(
         root = results / FOLDER if league else results
         for record in contest(root, attempts, Path(folder), limit, homes, again):
             print(f"{record.name}: {record.status}" + (f", {record.message}" if record.message else ""), flush=True)
+
+
+def kept_rows(table: Path, again: list[str]) -> list[dict[str, Any]]:
+    """Rows of a table of settings, without those of programs that are tried again."""
+    if not table.is_file():
+        return []
+    return [row for row in pd.read_csv(table).to_dict("records") if row["engine"] not in again]
 
 
 if __name__ == "__main__":

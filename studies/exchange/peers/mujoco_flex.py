@@ -1,7 +1,9 @@
 """MuJoCo: flexible bodies ("flex") of linear tetrahedra, Saint Venant-Kirchhoff, with contact by its own solver.
 
 Volume is kept as its documentation has it, by a Poisson ratio near ½; the shear modulus is that of the tissue. Damping
-is that of the scene, on every degree of freedom. Obstacles are bodies that are moved by hand ("mocap").
+is that of the scene, on every degree of freedom. Obstacles are bodies that are moved by hand ("mocap"). So are held
+nodes, made so heavy that nothing moves them in a step; the force of a held region is what the springs of MuJoCo's
+elements ("qfrc_spring") push there.
 """
 
 # Checked alike where the package is not installed.
@@ -19,6 +21,8 @@ POISSON = 0.49
 """kappa is 50 mu. Nearer to ½ the force of a ball gains some percent, its volume nothing."""
 STEP = 2e-3
 """[s]; implicit in positions (integrator "discrete")."""
+HEAVY = 1e6
+"""Mass of a held node over its own."""
 
 XML = """<mujoco>
 <option timestep="{dt}" gravity="{gravity}" integrator="discrete" cone="elliptic"/>
@@ -28,7 +32,6 @@ XML = """<mujoco>
 <flexcomp name="organ" type="direct" dim="3" mass="{mass}" radius="1e-6" point="{points}" element="{cells}">
 <contact condim="1" selfcollide="none" solref="{solref}"/>
 <elasticity young="{young}" poisson="{poisson}"/>
-{pins}
 </flexcomp>
 </worldbody>
 </mujoco>"""
@@ -36,13 +39,12 @@ XML = """<mujoco>
 
 def model_of(scene: SceneFolder, dt: float, poisson: float, stiff: float) -> mujoco.MjModel:
     """The scene as MuJoCo's model. Raises CannotDo."""
-    scene.check_simple()
+    scene.check_simple(masses=True)
     contact = f'condim="1" friction="0 0 0" solref="{stiff * dt} 1"'
     shapes = "\n".join(
         f'<body name="obstacle{k}" mocap="true" pos="{_text(place(o, 0.0))}"><geom {_shape(o)} {contact}/></body>'
         for k, o in enumerate(scene.obstacles("plane", "sphere"))
     )
-    pins = f'<pin id="{_text(scene.held)}"/>' if len(scene.held) else ""
     corners = scene.points[scene.cells]
     volumes = np.einsum("ij,ij->i", corners[:, 1] - corners[:, 0], _cross(corners)) / 6.0
     model = mujoco.MjModel.from_xml_string(
@@ -56,7 +58,6 @@ def model_of(scene: SceneFolder, dt: float, poisson: float, stiff: float) -> muj
             solref=f"{stiff * dt} 1",
             young=2.0 * scene.mu * (1.0 + poisson),
             poisson=poisson,
-            pins=pins,
         )
     )
     _set_masses(model, scene, volumes)
@@ -66,13 +67,16 @@ def model_of(scene: SceneFolder, dt: float, poisson: float, stiff: float) -> muj
 def _set_masses(model: mujoco.MjModel, scene: SceneFolder, volumes: np.ndarray) -> None:
     """A quarter of each tetrahedron at its corners, where MuJoCo shares the mass evenly; and the scene's damping."""
     mass = np.bincount(scene.cells.ravel(), np.repeat(volumes / 4.0, 4), len(scene.points)) * scene.density
-    bodies = model.flex_vertbodyid
-    free = np.setdiff1d(np.arange(len(scene.points)), scene.held)
-    model.body_mass[bodies[free]] = mass[free]
-    for node in free:
-        body = bodies[node]
-        first, count = model.body_dofadr[body], model.body_dofnum[body]
-        model.dof_damping[first : first + count] = scene.data["damping"]["rate"] * mass[node]
+    mass += scene.hung
+    model.dof_damping[_freedoms(model)] = scene.data["damping"]["rate"] * mass[:, None]
+    mass[scene.held] *= HEAVY
+    model.body_mass[model.flex_vertbodyid] = mass
+    mujoco.mj_setConst(model, mujoco.MjData(model))  # bodies that only slide take their inertia from there
+
+
+def _freedoms(model: mujoco.MjModel) -> np.ndarray:
+    """Numbers of the three degrees of freedom of every node, (n, 3): slides along the axes, in `qpos` and `qvel`."""
+    return model.body_dofadr[model.flex_vertbodyid][:, None] + np.arange(3)
 
 
 def run(
@@ -85,29 +89,40 @@ def run(
     stiff: float = 2.0,
 ) -> None:
     """Runs the scene with steps of `step` × shorter and hands it in; stiff: time constant of contacts over the step."""
-    dt, asked = step * shorter, scene.probed
+    dt = step * shorter
     model = model_of(scene, dt, poisson, stiff)
-    data = mujoco.MjData(model)
+    data, freedoms = mujoco.MjData(model), _freedoms(model)
+    held = freedoms[scene.held]
     mujoco.mj_forward(model, data)
 
     def advance(t: float) -> None:
         for k, obstacle in enumerate(scene.data["obstacles"]):
             data.mocap_pos[k] = place(obstacle, t)
+        data.qpos[held], data.qvel[held] = scene.held_at(t) - scene.points[scene.held], 0.0
         mujoco.mj_step(model, data)
 
-    direction = scene.data["force"]["direction"]
-    march(scene, out, dt, advance, lambda t: _force(model, data, asked, direction), lambda: data.flexvert_xpos.copy())
+    def positions() -> np.ndarray:
+        return scene.points + data.qpos[freedoms]
+
+    asked, nodes = scene.asked_obstacle, scene.asked_nodes
+
+    def force(t: float) -> float:
+        if asked is None:
+            return scene.along(-data.qfrc_spring[freedoms[nodes]].sum(axis=0))
+        return abs(scene.along(_contact_force(model, data, asked)))
+
+    march(scene, out, dt, advance, force, positions)
 
 
-def _force(model: mujoco.MjModel, data: mujoco.MjData, asked: int, direction: list[float]) -> float:
-    """The probed force [N]: the sum of the contact forces at the obstacle that is asked for, along its direction."""
+def _contact_force(model: mujoco.MjModel, data: mujoco.MjData, asked: int) -> np.ndarray:
+    """Sum of the contact forces at an obstacle, up to its sign, (3,) [N]."""
     total, found = np.zeros(3), np.zeros(6)
     for number in range(data.ncon):
         contact = data.contact[number]
         if asked in (model.geom_bodyid[contact.geom[0]] - 1, model.geom_bodyid[contact.geom[1]] - 1):
             mujoco.mj_contactForce(model, data, number, found)
             total += found[0] * contact.frame[:3]
-    return abs(float(total @ np.array(direction)))
+    return total
 
 
 def _shape(obstacle: dict[str, Any]) -> str:

@@ -2,7 +2,9 @@
 
 Volume is kept as its documentation has it, by the second Lame constant; here 49 mu, for stiffer ones need more sweeps.
 Obstacles are static shapes that are moved by hand and push by a penalty, on nodes, edges and whole facets; the force is
-the sum of the contact forces that it reports. Damping is that of the scene, on every velocity after a step.
+the sum of the contact forces that it reports. Held nodes have no mass and are put where they are held before each step;
+the force of a held region is computed from the stresses of its law. Damping is that of the scene, on every velocity
+after a step.
 """
 
 # Checked alike where the package is not installed.
@@ -18,6 +20,7 @@ import numpy as np
 import warp as wp  # pyright: ignore[reportMissingImports]
 
 from studies.exchange.peers.scene_folder import SceneFolder, hand_in, place, turn_to
+from studies.exchange.peers.stable_neo_hookean import PlainStableNeoHookean
 
 STEP, SWEEPS = 5e-3, 10
 """[s]; sweeps over all vertices in a step."""
@@ -33,7 +36,7 @@ FORCES = 20
 
 def model_of(scene: SceneFolder, lame: float, penalty: float) -> tuple[Any, list[int]]:
     """The scene as Newton's model, and the numbers of its obstacles. Raises CannotDo."""
-    scene.check_simple()
+    scene.check_simple(masses=True)
     builder = newton.ModelBuilder(gravity=tuple(scene.data["gravity"]))
     config = newton.ModelBuilder.ShapeConfig(ke=penalty, kd=0.0, mu=0.0)
     shapes = [
@@ -55,6 +58,8 @@ def model_of(scene: SceneFolder, lame: float, penalty: float) -> tuple[Any, list
         k_damp=0.0,
         particle_radius=RADIUS,
     )
+    for node in np.flatnonzero(scene.hung).tolist():
+        builder.particle_mass[node] += float(scene.hung[node])
     for node in scene.held.tolist():
         builder.particle_mass[node] = 0.0
         builder.particle_flags[node] &= ~int(newton.ParticleFlags.ACTIVE)
@@ -77,7 +82,8 @@ def run(
 ) -> None:
     """Runs the scene with steps of `step` × shorter and hands it in; facets: whole facets touch, not nodes alone."""
     wp.config.quiet = True
-    dt, asked = step * shorter, scene.probed
+    dt, held = step * shorter, scene.held
+    law = PlainStableNeoHookean(scene.points, scene.cells, scene.mu, lame * scene.mu)
     model, shapes = model_of(scene, lame, penalty)
     solver = newton.solvers.SolverVBD(model, iterations=sweeps, particle_enable_tile_solve=False)
     pipeline = newton.CollisionPipeline(model, enable_rigid_soft_full_surface_contact=facets)
@@ -91,12 +97,13 @@ def run(
         started = time.process_time()
         for step_number in range(begin + 1, end + 1):
             _place(model, shapes, scene, step_number * dt)
+            now.particle_q.numpy()[held] = after.particle_q.numpy()[held] = scene.held_at(step_number * dt)
             watched = end - step_number < FORCES
             _step(solver, pipeline, contacts, now, after, control, dt, observed if watched else None)
             after.particle_qd.numpy()[:] *= kept
             now, after = after, now
             if watched:
-                sampled.append(_force(scene, contacts, observed, shapes[asked]))
+                sampled.append(_force(scene, contacts, observed, shapes, law, now))
         spent += time.process_time() - started
         positions.append(now.particle_q.numpy().astype(np.float64))
         forces.append(float(np.mean(sampled[-FORCES:])))
@@ -125,10 +132,14 @@ def _place(model: Any, shapes: list[int], scene: SceneFolder, t: float) -> None:
     model.shape_transform.assign(transforms)
 
 
-def _force(scene: SceneFolder, contacts: Any, observed: Any, shape: int) -> float:
-    """The probed force [N]: the sum of the contact forces between the body and the obstacle that is asked for."""
+def _force(scene: SceneFolder, contacts: Any, observed: Any, shapes: list[int], law: Any, now: Any) -> float:
+    """The probed force [N]: the sum of the contact forces between the body and the obstacle that is asked for, or what
+    holds a region against the stresses."""
+    if scene.asked_obstacle is None:
+        inside = law.forces(now.particle_q.numpy().astype(np.float64))
+        return scene.along(-inside[scene.asked_nodes].sum(axis=0))
     count = int(contacts.soft_contact_count.numpy()[0])
     first = contacts.rigid_contact_max
     wrenches = observed.contact_f.numpy()[first : first + count, :3]
-    asked = contacts.soft_contact_shape.numpy()[:count] == shape
-    return abs(float(wrenches[asked].sum(axis=0) @ np.array(scene.data["force"]["direction"])))
+    asked = contacts.soft_contact_shape.numpy()[:count] == shapes[scene.asked_obstacle]
+    return abs(scene.along(wrenches[asked].sum(axis=0)))

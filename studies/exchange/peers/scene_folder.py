@@ -43,7 +43,7 @@ class SceneFolder:
     def _grid(self) -> meshio.Mesh:
         return meshio.read(self.folder / self.data["meshes"][self.mesh]["file"])
 
-    @property
+    @cached_property
     def points(self) -> np.ndarray:
         """Rest positions [m], (n, 3)."""
         return np.asarray(self._grid.points, np.float64)
@@ -86,29 +86,60 @@ class SceneFolder:
         return self.data["obstacles"]
 
     @property
-    def probed(self) -> int:
-        """Number of the obstacle whose force is asked for. Raises CannotDo where it is that of a held region."""
-        if self.data["force"]["of"] != "obstacle":
-            raise CannotDo("its adapter reads the force of an obstacle, not that of a held region")
-        return int(self.data["force"]["number"])
+    def asked_obstacle(self) -> int | None:
+        """Number of the obstacle whose force is asked for; None where it is that of a held region."""
+        asked = self.data["force"]
+        return int(asked["number"]) if asked["of"] == "obstacle" else None
 
-    def check_simple(self, moving_holds: bool = False) -> None:
-        """Raises CannotDo for a lumen, a start in motion, a cut whose faces touch and, unless `moving_holds`, held
-        regions that move."""
+    @property
+    def asked_nodes(self) -> np.ndarray:
+        """Nodes of the held region whose force is asked for, (k,); none where it is that of an obstacle."""
+        if self.asked_obstacle is not None:
+            return np.empty(0, np.int64)
+        return self.marked(self.data["held"][self.data["force"]["number"]]["point_data"])
+
+    def along(self, push: np.ndarray) -> float:
+        """The probed force [N] of a push on the body (3,) [N]."""
+        return float(push @ np.array(self.data["force"]["direction"]))
+
+    @property
+    def hung(self) -> np.ndarray:
+        """What hangs at every node beside its share of the tissue [kg], (n,): of the silicone beam alone."""
+        masses = np.zeros(len(self.points))
+        for entry in self.data.get("masses", ()):
+            masses[entry["node"]] += entry["mass"]
+        return masses
+
+    def check_simple(self, masses: bool = False) -> None:
+        """Raises CannotDo for a lumen, a start in motion, a cut whose faces touch and, unless `masses`, something that
+        hangs at nodes."""
+        if not masses and self.data.get("masses"):
+            raise CannotDo("its adapter hangs no masses at nodes")
         if self.data["lumen"] is not None:
             raise CannotDo("its adapter knows solid organs, not a wall round a lumen")
         if self.data["start"]["speed"] is not None:
             raise CannotDo("its adapter starts at rest")
         if self.data["cut"] is not None and self.data["cut"]["contact"]:
             raise CannotDo("its adapter lets the faces of a cut pass through each other")
-        if not moving_holds and any(np.any(held["path"]["displacements"]) for held in self.data["held"]):
-            raise CannotDo("its adapter knows held regions that do not move")
 
-    @property
+    @cached_property
+    def _regions(self) -> list[tuple[dict[str, Any], np.ndarray]]:
+        """Path and nodes of each held region; a node of two counts for the first."""
+        found, seen = [], np.empty(0, np.int64)
+        for held in self.data["held"]:
+            nodes = np.setdiff1d(self.marked(held["point_data"]), seen)
+            found, seen = [*found, (held["path"], nodes)], np.union1d(seen, nodes)
+        return found
+
+    @cached_property
     def held(self) -> np.ndarray:
-        """Nodes that stay where they are."""
-        nodes = [self.marked(held["point_data"]) for held in self.data["held"]]
-        return np.unique(np.concatenate(nodes)) if nodes else np.empty(0, np.int64)
+        """Nodes of all held regions, (k,), region by region."""
+        return np.concatenate([np.empty(0, np.int64), *(nodes for _, nodes in self._regions)])
+
+    def held_at(self, t: float) -> np.ndarray:
+        """Where the held nodes are at time t [s] [m], (k, 3), in the order of `held`."""
+        ways = [np.broadcast_to(moved(path, t), (len(nodes), 3)) for path, nodes in self._regions]
+        return self.points[self.held] + np.concatenate([np.empty((0, 3)), *ways])
 
 
 def moved(path: dict[str, Any], t: float) -> np.ndarray:

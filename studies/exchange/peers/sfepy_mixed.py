@@ -9,12 +9,13 @@ holds is held at three nodes so that it cannot turn or drift, which takes no for
 # pyright: reportMissingImports=false
 
 import time
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from sfepy.base.base import IndexedStruct, output
-from sfepy.discrete import Equation, Equations, FieldVariable, Integral, Material, Problem
+from sfepy.discrete import Equation, Equations, FieldVariable, Function, Integral, Material, Problem
 from sfepy.discrete.conditions import Conditions, EssentialBC
 from sfepy.discrete.fem import FEDomain, Field, Mesh
 from sfepy.mechanics.contact_bodies import ContactPlane, ContactSphere
@@ -22,12 +23,14 @@ from sfepy.solvers.ls import ScipyDirect
 from sfepy.solvers.nls import Newton
 from sfepy.terms import Term
 
-from studies.exchange.peers.scene_folder import CannotDo, SceneFolder, hand_in, place
+from studies.exchange.peers.scene_folder import CannotDo, SceneFolder, hand_in, moved, place
 
 INCREMENTS = 2
 """Load steps between two checkpoints."""
 PENALTY = 2000.0
 """Pressure over depth, times the size of the body, over the shear modulus: depths of less than 0.1 % of the size."""
+HALVINGS = 3
+"""Of a load step that does not converge, at most."""
 WIDE = 1.0
 """Half the edge of a plane [m]."""
 
@@ -40,7 +43,8 @@ class Body:
         scene.check_simple()
         if np.any(scene.data["gravity"]):
             raise CannotDo("its adapter knows no weight")
-        self.scene, self.obstacles, self.asked = scene, scene.obstacles("plane", "sphere"), scene.probed
+        self.scene, self.obstacles, self.asked = scene, scene.obstacles("plane", "sphere"), scene.asked_obstacle
+        self.now, self.holds = 0.0, list[Any]()
         output.set_output(quiet=True)
         mesh = Mesh.from_data("organ", scene.points, None, [scene.cells], [np.zeros(len(scene.cells), int)], ["3_4"])
         self.domain = FEDomain("domain", mesh)
@@ -55,6 +59,7 @@ class Body:
         inner, outer = Integral("inner", order=3), Integral("outer", order=4)
         push = Term.new("dw_tl_he_neohook(m.mu, v, u)", inner, whole, m=m, v=v, u=u)
         push = push + Term.new("dw_tl_bulk_pressure(v, u, p)", inner, whole, v=v, u=u, p=p)
+        self.inside = list(push)
         self.contacts = [self._contact(one, outer, outside, {"m": m, "u": u, "v": v}) for one in self.obstacles]
         for contact in self.contacts:
             push = push + contact
@@ -85,12 +90,8 @@ class Body:
 
     def _tied(self) -> list[Any]:
         scene = self.scene
-        if len(scene.held):
-            region = self.domain.create_region("Held", "vertex " + ", ".join(map(str, scene.held)), "vertex")
-            faces = self.domain.create_region("HeldFaces", "vertices of surface *v r.Held", "facet")
-            return [
-                EssentialBC("held", faces if faces.has_cells() or len(faces.entities[2]) else region, {"u.all": 0.0})
-            ]
+        if scene.data["held"]:
+            return [self._hold(number, held) for number, held in enumerate(scene.data["held"])]
         x = scene.points - scene.points.mean(axis=0)
         corners = np.abs(x).max() * np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])
         nodes = [int(np.linalg.norm(x - corner, axis=1).argmin()) for corner in corners]
@@ -100,8 +101,22 @@ class Body:
             for k, (node, values) in enumerate(zip(nodes, fixed, strict=True))
         ]
 
+    def _hold(self, number: int, held: dict[str, Any]) -> Any:
+        """A region with the nodes in the middle of its edges, which is where its path is at `self.now`."""
+        nodes = ", ".join(map(str, self.scene.marked(held["point_data"])))
+        region = self.domain.create_region(f"Held{number}", f"vertex {nodes}", "vertex")
+        faces = self.domain.create_region(f"HeldFaces{number}", f"vertices of surface *v r.Held{number}", "facet")
+
+        def way(ts: Any, coors: np.ndarray, **_: Any) -> np.ndarray:
+            return np.broadcast_to(moved(held["path"], self.now), coors.shape).copy()
+
+        where = faces if faces.has_cells() or len(faces.entities[2]) else region
+        self.holds.append(where)
+        return EssentialBC(f"held{number}", where, {"u.all": Function(f"way{number}", way)})
+
     def step(self, t: float) -> None:
         """To the equilibrium at time t [s]. Raises RuntimeError where Newton's method does not converge."""
+        self.now = t
         for contact, one in zip(self.contacts, self.obstacles, strict=True):
             if one["kind"] == "sphere":
                 contact.cs = ContactSphere(place(one, t), one["radius"])
@@ -110,19 +125,41 @@ class Body:
                 across = np.linalg.svd(normal[None])[2][1:]
                 corners = [a * across[0] + b * across[1] for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
                 contact.cp = ContactPlane(place(one, t), normal, place(one, t) + WIDE * np.array(corners))
-        self.state = self.problem.solve(state0=self.state, save_results=False)()
+        state = self.problem.solve(state0=self.state, save_results=False)()
         if self.status["condition"] != 0:
             raise RuntimeError(f"Newton's method does not converge at t = {t:g} s")
+        self.state = state
+
+    def advance(self, before: float, now: float, halvings: int = HALVINGS) -> None:
+        """From the equilibrium at a time to that at another [s], in halves where that fails. Raises RuntimeError."""
+        try:
+            self.step(now)
+        except RuntimeError:
+            if halvings == 0:
+                raise
+            middle = 0.5 * (before + now)
+            self.advance(before, middle, halvings - 1)
+            self.advance(middle, now, halvings - 1)
 
     def positions(self) -> np.ndarray:
         """Of all nodes [m], (n, 3)."""
         return self.scene.points + self.u().reshape(-1, 3)[: len(self.scene.points)]
 
     def force(self) -> float:
-        """The probed force [N]: the integral of the penalty over the facets."""
-        values = self.contacts[self.asked].evaluate(mode="weak", dw_mode="vector", standalone=False)[0]
-        push = values.reshape(len(values), 3, -1).sum(axis=(0, 2))
-        return abs(float(push @ np.array(self.scene.data["force"]["direction"])))
+        """The probed force [N]: the integral of the penalty over the facets, or what holds a region against the stress
+        of the elements."""
+        if self.asked is not None:
+            push = self._values(self.contacts[self.asked], {"dw_mode": "vector"})
+            return abs(self.scene.along(push.sum(axis=(0, 2))))
+        push = sum(self._values(term, {}) for term in self.inside)
+        nodes = self.field.get_dofs_in_region(self.holds[self.scene.data["force"]["number"]])
+        return self.scene.along(np.moveaxis(push, 1, 2)[np.isin(self.field.econn, nodes)].sum(axis=0))
+
+    @staticmethod
+    def _values(term: Any, options: dict[str, str]) -> np.ndarray:
+        """Of a term for every node of every element, (k, 3, nodes) [N]."""
+        values = term.evaluate(mode="weak", standalone=False, **options)[0]
+        return values.reshape(len(values), 3, -1)
 
 
 def run(
@@ -133,8 +170,8 @@ def run(
     body, many = Body(scene, penalty), round(increments / shorter)
     positions, forces = [scene.points], [0.0]
     for before, now in zip(scene.times[:-1], scene.times[1:], strict=True):
-        for t in np.linspace(before, now, many + 1)[1:]:
-            body.step(float(t))
+        for begin, end in pairwise(np.linspace(before, now, many + 1).tolist()):
+            body.advance(begin, end)
         positions.append(body.positions())
         forces.append(body.force())
     spent = time.process_time() - started

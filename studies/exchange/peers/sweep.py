@@ -23,12 +23,12 @@ SCENE, NODES = LIVER_PRESS, 150
 SHARE = "share of the target [1]"
 """The larger of the errors of force and displacement, over what is usually enough."""
 GRIDS: dict[str, tuple[dict[str, Any], ...]] = {
-    "drake": ({}, {"poisson": 0.45}, {"poisson": 0.4}, {"law": "kCorotated"}),
-    "mujoco": ({}, {"poisson": 0.45}, {"poisson": 0.4}),
-    "newton": ({}, {"facets": False}, {"lame": 9.0}, {"lame": 4.0}),
-    "felupe": ({}, {"penalty": 100.0}),
-    "bullet": ({}, {"lame": 9.0}, {"lame": 4.0}),
-    "sfepy": ({}, {"increments": 1}),
+    "mujoco": ({}, {"poisson": 0.45}, {"poisson": 0.4}, {"poisson": 0.3}),
+    "felupe": ({}, {"penalty": 10.0}),
+    "newton": ({}, {"lame": 9.0}, {"lame": 4.0}, {"lame": 1.5}),
+    "bullet": ({}, {"lame": 4.0}, {"lame": 1.5}),
+    "drake": ({}, {"poisson": 0.45}, {"poisson": 0.4}, {"poisson": 0.3}),
+    "sfepy": ({}, {"increments": 1}, {"penalty": 500.0}),
 }
 """What is tried of each; {} are the settings with which its adapter is written."""
 

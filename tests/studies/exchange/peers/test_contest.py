@@ -133,7 +133,6 @@ REFUSED = {
     ),
     "friction": (replace(BALL_SQUEEZE, obstacles=(Plane((0, 0, 0.05), (0, 0, -1), friction=0.3),)), "coefficient 0.3"),
     "a lumen": (STOMACH_PRESS, "knows solid organs"),
-    "moving caps": (BALL_CLAMPED, "held regions that do not move"),
 }
 
 

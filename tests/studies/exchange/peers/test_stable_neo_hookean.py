@@ -1,18 +1,18 @@
-"""The forces by which Bullet's reaction is read are those of its energy, and its constants those of the tissue."""
+"""Forces computed for programs that do not report them are those of an energy, with the constants of the tissue."""
 
 import numpy as np
 import pytest
 
-from studies.exchange.peers.stable_neo_hookean import StableNeoHookean
+from studies.exchange.peers.stable_neo_hookean import PlainStableNeoHookean, StableNeoHookean
 
 MU, LAM = 1800.0, 49 * 1800.0
 REST = 0.1 * np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 1]], float)
 CELLS = np.array([[0, 1, 2, 3], [1, 2, 3, 4]])
 
 
-@pytest.fixture
-def law():
-    return StableNeoHookean(REST, CELLS, MU, LAM)
+@pytest.fixture(params=[StableNeoHookean, PlainStableNeoHookean])
+def law(request):
+    return request.param(REST, CELLS, MU, LAM)
 
 
 def test_forces_are_minus_the_derivative_of_the_energy(law):
