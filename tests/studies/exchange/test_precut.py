@@ -197,7 +197,7 @@ def test_adapters_without_contact_of_faces_say_so(tmp_path, mesh_cache):
     page = (tmp_path / "pressed" / "README.md").read_text()
     assert "touch without friction where the cut closes" in page
     with pytest.raises(CannotDo, match="lets the faces of a cut pass through each other"):
-        SceneFolder(tmp_path / "pressed").check_simple(moving_holds=True)
+        SceneFolder(tmp_path / "pressed").check_simple()
 
 
 def test_a_cut_whose_time_matters_is_not_given_away(tmp_path):
