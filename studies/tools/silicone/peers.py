@@ -10,12 +10,12 @@ import tempfile
 from pathlib import Path
 from typing import Annotated, Any
 
-import meshio
 import numpy as np
 import typer
 
 from studies.base.errors import StudyError
 from studies.exchange.peers.contest import PEERS, Attempt, Peer, hand_over
+from studies.geometry.files.grids import write_grid_file
 from studies.plots.silicone import Point
 from studies.scene.library import BALL_CLAMPED
 from studies.store.record import Status
@@ -40,7 +40,7 @@ def write_beam(folder: Path, beam: Beam, youngs: float, load: Load, damping: flo
     where, shares = hung(points, load.mass, SIDE)
     marks = {"outer": np.ones(len(points), int), "held_glued": glued(points).astype(int)}
     folder.mkdir(parents=True, exist_ok=True)
-    meshio.write(folder / "straight.vtu", meshio.Mesh(points, {"tetra": cells}, point_data=marks))
+    write_grid_file(folder / "straight.vtu", points, {"tetra": cells}, marks)
     mu, frames = shear_modulus(youngs), round(duration / FRAME)
     stays = {"times": [0.0], "displacements": [[0.0, 0.0, 0.0]]}
     data = {
