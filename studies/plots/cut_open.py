@@ -83,9 +83,9 @@ def _draw_row(row: Sequence[Axes], run: Run, camera: Camera) -> None:
     )
     off = f"{force_end(run):+.1f} %".replace("-", "−")
     words = (
-        (f"{heading(run.case.scene.name)}, before", f"force {in_newtons(run.force[at[0]])}"),
-        ("cut and pulled", f"gapes {gap:.1f} mm, force {in_newtons(run.force[at[-1]])} ({off})"),
-        ("reference", f"gapes {truth:.1f} mm, force {in_newtons(force[-1])}"),
+        (f"{heading(run.case.scene.name)}, before", f"force {in_newtons(float(run.force[at[0]]))}"),
+        ("cut and pulled", f"gapes {gap:.1f} mm, force {in_newtons(float(run.force[at[-1]]))} ({off})"),
+        ("reference", f"gapes {truth:.1f} mm, force {in_newtons(float(force[-1]))}"),
     )
     for axes, (title, line) in zip(row, words, strict=True):
         axes.set_title(f"{title}\n{line}", size=NORMAL, weight="normal")

@@ -151,7 +151,7 @@ class Body:
         if self.asked is not None:
             push = self._values(self.contacts[self.asked], {"dw_mode": "vector"})
             return abs(self.scene.along(push.sum(axis=(0, 2))))
-        push = sum(self._values(term, {}) for term in self.inside)
+        push = np.sum([self._values(term, {}) for term in self.inside], axis=0)
         nodes = self.field.get_dofs_in_region(self.holds[self.scene.data["force"]["number"]])
         return self.scene.along(np.moveaxis(push, 1, 2)[np.isin(self.field.econn, nodes)].sum(axis=0))
 

@@ -15,7 +15,20 @@ from studies.metrics.run import Run, by_scene
 from studies.metrics.table import metric
 from studies.plots.style.families import FAMILIES, Family, family_of
 from studies.plots.style.page import blank, finish, log_axis, page, panels
-from studies.plots.style.style import BLACK, BLUE, GREEN, GREY, MUTED, ORANGE, PURPLE, drawing, remark, styled
+from studies.plots.style.style import (
+    BLACK,
+    BLUE,
+    GREEN,
+    GREY,
+    MUTED,
+    ORANGE,
+    PURPLE,
+    SKY,
+    VERMILLION,
+    drawing,
+    remark,
+    styled,
+)
 
 TITLE = "Other programs on the same meshes: down and to the left is better"
 VOLUME = metric("volume_worst")
@@ -23,7 +36,9 @@ ROWS = {FORCE: "error of the force [%]", VOLUME: "volume off by [%]"}
 LOWEST = {FORCE: 0.1, VOLUME: 1e-5}
 """What is smaller is drawn there [%]."""
 ROOM = 2.0
-SPARE = tuple(zip((ORANGE, GREEN, BLUE, PURPLE, BLACK, MUTED[2], MUTED[1], MUTED[0]), "^sDvX<>h", strict=True))
+SPARE = tuple(
+    zip((ORANGE, GREEN, BLUE, PURPLE, BLACK, MUTED[2], MUTED[1], MUTED[0], SKY, VERMILLION), "^sDvX<>hP*", strict=True)
+)
 """Colours and markers of what has none of its own, in the order of its appearance."""
 NAMED = 2
 """Reasons for having no point that a note gives."""
