@@ -13,6 +13,7 @@ from studies.exchange.entry import run_of_entry
 from studies.exchange.export import export
 from studies.exchange.peers.contest import Attempt, Peer, judged
 from studies.metrics.judged import judged as judged_run
+from studies.metrics.table import metric
 from studies.metrics.wish import SOLID
 from studies.reference.load import reference_for
 from studies.scene.library import LIVER_PRESS
@@ -21,7 +22,11 @@ from studies.store.record import Record, Status
 SCENE, NODES = LIVER_PRESS, 150
 """It has a force and a displacement, a hold, and a plane, which every program knows."""
 SHARE = "share of the target [1]"
-"""The larger of the errors of force and displacement, over what is usually enough."""
+"""The largest of the errors of force, displacement and volume, over what is usually enough. Without the volume a tissue
+that gives way counts as the best: with a Poisson ratio of 0.3 coarse tetrahedra lock less, and lose 8 to 11 % of the
+volume of a squeezed ball."""
+VOLUME, LOST = metric("volume_worst"), 1.0
+"""Error of the volume [%] that is usually enough."""
 GRIDS: dict[str, tuple[dict[str, Any], ...]] = {
     "mujoco": ({}, {"poisson": 0.45}, {"poisson": 0.4}, {"poisson": 0.3}),
     "felupe": ({}, {"penalty": 10.0}),
@@ -44,15 +49,18 @@ def swept(peer: Peer, folder: Path, limit: float, environments: Path) -> Iterato
 
 
 def _numbers(record: Record) -> dict[str, Any]:
-    found = judged_run(run_of_entry(record, reference_for(Path(), SCENE))) if record.status == Status.OK else None
-    if found is None:
+    run = run_of_entry(record, reference_for(Path(), SCENE)) if record.status == Status.OK else None
+    found = None if run is None else judged_run(run)
+    if run is None or found is None:
         return {"status": str(record.status), "message": record.message}
+    force, displacement, volume = found.force.value, found.displacement.value, VOLUME(run)
     return {
         "status": str(record.status),
-        "force_end [%]": found.force.value,
-        "mean_error [%]": found.displacement.value,
+        "force_end [%]": force,
+        "mean_error [%]": displacement,
+        "volume_worst [%]": volume,
         "cost [s/s]": found.cost.value,
-        SHARE: max(abs(found.force.value) / SOLID[0], found.displacement.value / SOLID[1]),
+        SHARE: max(abs(force) / SOLID[0], displacement / SOLID[1], volume / LOST),
     }
 
 
