@@ -211,20 +211,19 @@ def _why_not(one: Judged, wish: Wish) -> str:
 
 
 def cuts(published: Path) -> str:
-    """How far the finest body is from the reference where a cut gapes, and where its faces touch."""
-    rows = [row for row in table(published, "cutting") if row["recipe"] == row["recipe"] and row[MEAN] == row[MEAN]]
-    finest = [
-        row for row in rows if row["body"].startswith("adaptive") and row["nodes"] == max(r["nodes"] for r in rows)
-    ]
+    """How far the finest adaptive body at real time is from the reference where a cut gapes, and where its faces
+    touch."""
+    rows = [row for row in table(published, "cutting") if row["body"].startswith("adaptive") and row[SPEED] >= 1.0]
+    finest = {row["scene"]: row for row in sorted(rows, key=lambda row: row["nodes"])}
     touching = {scene.name for scene in CUT if any(cut.contact for cut in scene.cuts)}
-    gaping, closed = ([row for row in finest if (row["scene"] in touching) == way] for way in (False, True))
-    sizes = {name: [abs(value) for value in column(gaping, name)] for name in (OPENING, FORCE, MEAN)}
+    gaping, closed = ([row for name, row in finest.items() if (name in touching) == way] for way in (False, True))
+    off = {name: [abs(value) for value in column(gaping, name)] for name in (OPENING, FORCE)}
     return (
-        f"**Organs can be cut.** Adaptive bodies with {finest[0]['nodes']} nodes open as the reference within "
-        f"{max(sizes[OPENING]):.1f} %, their force is within {max(sizes[FORCE]):.1f} %, their displacement within "
-        f"{max(sizes[MEAN]):.1f} % on {len(gaping)} scenes; pressed shut, their slip is "
-        f"{_range(column(closed, OPENING))} % off. Each piece keeps its volume to "
-        f"{plain(max(column(finest, PIECE)))} % ([cut an organ](docs/cutting.md), "
+        f"**Organs can be cut.** On {len(gaping)} scenes the opening of adaptive bodies at real time is "
+        f"{_range(off[OPENING], 1)} % off and their force {_range(off[FORCE], 1)} %; where cuts are pressed shut, "
+        f"their slip is {_range(column(closed, OPENING), 1)} % off. Displacements are within "
+        f"{max(column(finest.values(), MEAN)):.1f} %, volumes of pieces within "
+        f"{plain(max(column(finest.values(), PIECE)))} % ([cut an organ](docs/cutting.md), "
         f"[pictures](results/published/cutting/cut_open.png))."
     )
 
