@@ -62,7 +62,7 @@ PEERS: tuple[Peer, ...] = (
         packages=("newton==1.8.0", "warp-lang==1.19.0"),
         settings={"lame": 1.5},
     ),
-    Peer("bullet", ADAPTERS + "bullet", packages=("pybullet==3.2.7",)),
+    Peer("bullet", ADAPTERS + "bullet", packages=("pybullet==3.2.7",), settings={"lame": 1.5}),
     Peer("drake", ADAPTERS + "drake_deformable", packages=("drake==1.51.1",), settings={"poisson": 0.3}),
     Peer("sfepy", ADAPTERS + "sfepy_mixed", packages=("sfepy==2026.3",)),
     Peer("sofa", absent="no wheel on PyPI; it comes as binaries of its own or by conda"),
