@@ -78,7 +78,7 @@ def peer_row(peer: Peer, load: Load, youngs: float, folder: Path, environments: 
     status, message = hand_over(Attempt(known, BALL_CLAMPED, 0), given, out, LIMIT, environments)
     if status != Status.OK:
         raise StudyError(message)
-    found = np.load(out)
+    found = np.load(out, allow_pickle=False)
     swing = swing_of(found["t"], marker_sag(found["positions"][0], found["positions"]).mean(axis=1))
     return Point(peer.name, load.newton, 1e3 * swing.sag, swing.frequency, swing.damping)
 

@@ -243,7 +243,7 @@ def test_a_body_that_comes_as_a_mesh_keeps_its_flat_sides(tmp_path):
     fine, parents = start.finer(np.arange(1.0, body.mesh.nelements + 1), 3 * body.mesh.nelements)
     check_parents(body.mesh, fine.body.mesh, parents)
     np.testing.assert_allclose(fine.points, nodes(fine.body.mesh), rtol=0, atol=1e-15)
-    assert fine.off == 0 and not len(fine.lumen)
+    assert fine.off == 0 and fine.lumen_at(0.0) is None
 
 
 def test_nothing_is_marked_where_nothing_is_indicated():
