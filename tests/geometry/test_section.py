@@ -19,7 +19,7 @@ from studies.geometry.mesh.organ_mesh import (
     unique_edges,
 )
 from studies.geometry.mesh.quality import dihedral_angles
-from studies.geometry.mesher.section import loops
+from studies.geometry.mesher.section import loops, section
 
 MIDDLE = HalfSpace((0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
 HALF = HalfSpace((0.0, 0.0, 0.0), (1.0, 0.0, 0.0))
@@ -132,3 +132,11 @@ def test_loops_follow_their_edges():
     for loop in found:
         steps = {tuple(sorted(pair)) for pair in zip(loop, np.roll(loop, -1), strict=True)}
         assert steps <= {tuple(sorted(edge)) for edge in edges.tolist()}
+
+
+@pytest.mark.parametrize("within", [None, BallRegion((0.0, 0.0, 0.0), 0.1)])
+def test_a_plane_without_an_edge_of_the_surface_is_a_sentence(within):
+    """Of a coarse surface a cut of a few per mille may have none."""
+    plane = HalfSpace((0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
+    with pytest.raises(StudyError, match="cut 'a': no edge of the surface lies in its plane"):
+        section(plane, np.eye(3), np.empty((0, 2), int), within, "cut 'a'")

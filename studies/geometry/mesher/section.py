@@ -215,6 +215,8 @@ def section(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """New points (n, 3) [m] in the plane, the triangles of its section by all points, seen from in front, and which of
     them are the blade's. Raises StudyError."""
+    if not len(edges):
+        raise StudyError(f"{name}: no edge of the surface lies in its plane, so small is what it cuts; use more nodes")
     normal = np.asarray(plane.normal, float) / np.linalg.norm(plane.normal)
     one = np.cross(normal, np.eye(3)[np.abs(normal).argmin()])
     axes = np.stack([one / np.linalg.norm(one), np.cross(normal, one / np.linalg.norm(one))])

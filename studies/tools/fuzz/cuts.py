@@ -271,9 +271,10 @@ def case_of(trial: CutTrial, scene: Scene) -> Case:
     law, _, nodal = trial.body.partition(" ")
     method: Method = {method.name: method for method in METHODS}[trial.method]()
     if law == "quadratic":
-        return Case(scene, BodyRecipe("quadratic", 4 * trial.nodes - 6), method, dt_fraction=0.8)
+        recipe = BodyRecipe("quadratic", 4 * trial.nodes - 6, cut=trial.way)
+        return Case(scene, recipe, method, dt_fraction=0.8)
     if law == SURFACE:
-        return Case(scene, BodyRecipe(SURFACE, trial.nodes), method, dt_fraction=0.8)
+        return Case(scene, BodyRecipe(SURFACE, trial.nodes, cut=trial.way), method, dt_fraction=0.8)
     volumes = "nodal" if nodal or law == "cotangent" else "scene"
     recipe = BodyRecipe(nodes=trial.nodes, law=law, volumes=volumes, cut=trial.way)  # pyright: ignore[reportArgumentType]
     return Case(scene, recipe, method, dt_fraction=0.8)
