@@ -234,6 +234,11 @@ def other_programs(published: Path) -> str:
     ours = [row for row in rows if row["method"] == OURS and row["body"] == "quadratic"]
     felupe = [row for row in rows if row["method"] == "felupe"]
     linear = [row for row in rows if row["method"] in ("mujoco", "newton", "bullet")]
+    searched = [
+        row
+        for row in table(published, "league")
+        if row["scene"] == "liver_press" and row["engine"] in ("mujoco", "newton", "bullet")
+    ]
     speeds = {name: {row["nodes"]: row[SPEED] for row in of} for name, of in (("ours", ours), ("theirs", felupe))}
     off, off_felupe, off_linear = ([abs(force) for force in column(of, FORCE)] for of in (ours, felupe, linear))
     faster = mean(speed / speeds["theirs"][nodes] for nodes, speed in speeds["ours"].items())
@@ -241,7 +246,8 @@ def other_programs(published: Path) -> str:
         f"**On the pressed liver implicit elements are more accurate and slower.** FElupe's quadratic elements are "
         f"{_range(off_felupe, 1)} % off in force. Our quadratic bodies with elements of one size (here we "
         f"recommend graded ones) are {_range(off)} % off and {faster:.0f} times as fast. MuJoCo, Newton and PyBullet, "
-        f"on linear tetrahedra, are {_range(off_linear)} % off ([other programs](results/published/peers/peers.png))."
+        f"on linear tetrahedra, are {_range(off_linear)} % off ([other programs](results/published/peers/peers.png)), "
+        f"with searched settings {_range(map(abs, column(searched, FORCE)))} % ([league](docs/league.md))."
     )
 
 
@@ -332,7 +338,9 @@ def _range(values: Iterable[float], digits: int = 0) -> str:
 
 
 SENTENCES = (
-    Sentences("README.md", "findings", ("volume_loss", "frame_rate", "accuracy", "cutting", "peers"), headline),
-    Sentences("docs/findings.md", "answers", ("methods", "laws", "literature", "peers", "stress"), answers),
+    Sentences(
+        "README.md", "findings", ("volume_loss", "frame_rate", "accuracy", "cutting", "peers", "league"), headline
+    ),
+    Sentences("docs/findings.md", "answers", ("methods", "laws", "literature", "peers", "league", "stress"), answers),
     Sentences("docs/limits.md", "limits", ("volume_loss", "accuracy"), limits),
 )

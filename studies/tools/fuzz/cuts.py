@@ -6,7 +6,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 
@@ -72,7 +72,7 @@ class CutTrial(Choices):
     """Of the plane, of any length."""
     height: float = 0.5
     """Of the plane, over the extent along its normal; beyond 0 and 1 it misses."""
-    way: str = "conforming"
+    way: Literal["conforming", "virtual"] = "conforming"
     """Along faces of the mesh, or through its cells by virtual nodes."""
     blade: str = "none"
     reach: float = 0.5
@@ -276,7 +276,7 @@ def case_of(trial: CutTrial, scene: Scene) -> Case:
     if law == SURFACE:
         return Case(scene, BodyRecipe(SURFACE, trial.nodes, cut=trial.way), method, dt_fraction=0.8)
     volumes = "nodal" if nodal or law == "cotangent" else "scene"
-    recipe = BodyRecipe(nodes=trial.nodes, law=law, volumes=volumes, cut=trial.way)  # pyright: ignore[reportArgumentType]
+    recipe = BodyRecipe(nodes=trial.nodes, law=law, volumes=volumes, cut=trial.way)
     return Case(scene, recipe, method, dt_fraction=0.8)
 
 

@@ -14,6 +14,7 @@ import numpy as np
 import typer
 
 from studies.base.errors import StudyError
+from studies.base.lookup import lookup
 from studies.exchange.peers.contest import PEERS, Attempt, Peer, hand_over
 from studies.geometry.files.grids import write_grid_file
 from studies.plots.silicone import Point
@@ -89,10 +90,15 @@ def main(
     youngs: Annotated[float | None, typer.Option(help="E [Pa]; default: fitted to the unloaded beam")] = None,
     only: Annotated[str, typer.Option(help="one program by its name")] = "",
 ) -> None:
-    """Appends the rows of all programs to silicone.csv; what cannot be done is said on standard error."""
+    """Appends the rows of programs to silicone.csv, which `python -m studies.tools.silicone.main` makes; what cannot be
+    done is said on standard error. Raises StudyError for an unknown program, without that table, and where no program
+    releases the beam."""
+    if only:
+        lookup(only, [peer.name for peer in PEERS], "program (--only)")
+    table, written = results / "silicone" / "silicone.csv", 0
+    if not table.is_file():
+        raise StudyError(f"there is no table {table} to add rows to; `python -m studies.tools.silicone.main` makes it")
     stiff = youngs if youngs is not None else fitted_youngs(FINE)
-    table = results / "silicone" / "silicone.csv"
-    table.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory() as folder:
         for peer in (one for one in PEERS if only in ("", one.name)):
             for load in LOADS:
@@ -105,6 +111,9 @@ def main(
                     values = (f"{value:.4f}" for value in row[2:])
                     csv.writer(file, lineterminator="\n").writerow((row.who, row.newton, *values))
                 print(f"{row.who}, {row.newton:g} N: {row.sag:.2f} mm, {row.frequency:.3f} Hz, {row.damping:.4f}")
+                written += 1
+    if not written:
+        raise StudyError("no program released the beam; the lines above say why")
 
 
 if __name__ == "__main__":

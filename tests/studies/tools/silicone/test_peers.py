@@ -8,7 +8,7 @@ from studies.exchange.peers.contest import PEERS
 from studies.exchange.peers.scene_folder import CannotDo, SceneFolder
 from studies.tools.silicone.beam import DENSITY, LENGTH, SIDE, Beam
 from studies.tools.silicone.measured import GRAVITY, LOADS
-from studies.tools.silicone.peers import FRAME, peer_row, write_beam
+from studies.tools.silicone.peers import FRAME, main, peer_row, write_beam
 
 YOUNGS = 264_000.0
 
@@ -46,3 +46,15 @@ def test_a_program_without_an_adapter_says_why(tmp_path):
     sofa = next(peer for peer in PEERS if peer.name == "sofa")
     with pytest.raises(StudyError, match="sofa: no wheel on PyPI"):
         peer_row(sofa, LOADS[0], YOUNGS, tmp_path, tmp_path)
+
+
+def test_what_writes_no_row_is_an_error(tmp_path, capsys):
+    with pytest.raises(StudyError, match=r"no table .*silicone.csv to add rows to"):
+        main(tmp_path, youngs=YOUNGS)
+    (tmp_path / "silicone").mkdir()
+    (tmp_path / "silicone" / "silicone.csv").write_text("who\n")
+    with pytest.raises(StudyError, match="unknown program"):
+        main(tmp_path, youngs=YOUNGS, only="sofia")
+    with pytest.raises(StudyError, match="no program released the beam"):
+        main(tmp_path, youngs=YOUNGS, only="sofa")
+    assert "sofa: no wheel on PyPI" in capsys.readouterr().err
