@@ -20,7 +20,7 @@ from studies.geometry import OrganMesh
 from studies.geometry.mesher.jobs import cached
 from studies.geometry.surface.node_count import FEWEST
 from studies.meshing.bounds import HELD_AREA
-from studies.meshing.graded_mesh import check_number, halved, is_hollow, mesh_at, middles, outer_nodes
+from studies.meshing.graded_mesh import check_number, halved, is_hollow, middles, outer_nodes
 from studies.meshing.held_mesh import HeldMesh
 from studies.meshing.kept_shape import held_area_error, level_that_holds
 from studies.meshing.nested_mesh import edges_of, marked
@@ -91,11 +91,12 @@ def coarse_mesh(scene: Scene, wanted: int) -> tuple[OrganMesh, HeldMesh]:
 
 
 def lost_area(scene: Scene, level: int) -> float:
-    """The largest error of the area of a held region [%] of quadratic elements on a mesh with `level` vertices on the
-    outer surface; 0 where the true area is not known."""
+    """The largest error of the area of a held region [%] of quadratic elements on the mesh with `level` vertices on
+    the outer surface that will be halved; 0 where the true area is not known."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)  # of the mesh that is chosen they come later
-        mesh = mesh_at(scene, level, 0, 0, quadratic=True)
+        organ_mesh, coarse, _ = halved(scene, level, 0, 0)
+        mesh = quadratic_mesh(scene, organ_mesh, coarse, coarse, middles(scene))
     errors = [abs(held_area_error(scene, mesh, held)) for held in scene.held]
     return 100.0 * max((error for error in errors if error == error), default=0.0)
 

@@ -32,6 +32,10 @@ def saddle_matrix(n=40, seed=0):
     return np.block([[K @ K.T + n * np.eye(n), B.T], [B, -1e-6 * np.eye(n // 4)]])
 
 
+def pulled():
+    return [PrescribedDisplacement(lambda x: x[2] > 1 - 1e-9, (0, 1, 2), lambda t: (0.0, 0.1 * t, -0.2 * t))]
+
+
 def upper(matrix):
     return sp.csr_matrix(np.triu(matrix))
 
@@ -53,7 +57,7 @@ def test_an_unchecked_solve_gives_the_same_bits_and_asks_no_residual(backend, mo
     solver.factor(upper(A))
     b = np.random.default_rng(5).standard_normal((len(A), 3))
     x = solver.solve(b)
-    monkeypatch.setattr(solver, "misfit", lambda x, b: pytest.fail("a residual was computed"))
+    monkeypatch.setattr(solver, "product", lambda x: pytest.fail("a residual was computed"))
     assert np.array_equal(solver.solve(b, checked=False), x)
     solver.release()
 
@@ -75,19 +79,58 @@ def test_a_stale_factorisation_is_noticed():
     """The check of every answer by its residual: factors of another matrix do not pass."""
     solver = linear.SymmetricSolver("scipy")
     solver.factor(upper(saddle_matrix()))
-    b = np.arange(50, dtype=float)
-    stale = solver.factors.solve(b)
     solver.upper = upper(saddle_matrix(seed=1))
-    assert solver.misfit(stale, b) > linear.RESIDUAL_LIMIT
+    assert not solver.refined(np.arange(50, dtype=float))[1] <= linear.RESIDUAL_LIMIT
+
+
+def single_solver(monkeypatch):
+    monkeypatch.setattr(linear, "SINGLE_FROM", 10)
+    return linear.SymmetricSolver("pardiso")
+
+
+@pytest.mark.skipif(len(BACKENDS) == 1, reason="pypardiso is not installed")
+def test_single_precision_is_refined_to_the_same_limit(monkeypatch):
+    """Without refinement single precision misses the limit (the mutant: no refinement)."""
+    solver, rng = single_solver(monkeypatch), np.random.default_rng(5)
+    Q = np.linalg.qr(rng.standard_normal((60, 60)))[0]
+    A, b = Q @ np.diag(np.logspace(0, -4, 60)) @ Q.T, rng.standard_normal((60, 2))
+    solver.factor(upper(A))
+    assert solver.factors.single
+    assert np.abs(A @ solver.factors.solve(b) - b).max() > linear.RESIDUAL_LIMIT * np.abs(b).max()
+    assert np.abs(A @ solver.solve(b) - b).max() <= linear.RESIDUAL_LIMIT * np.abs(b).max()
+    assert solver.factors.single
+    solver.release()
+
+
+@pytest.mark.skipif(len(BACKENDS) == 1, reason="pypardiso is not installed")
+def test_what_single_precision_cannot_solve_is_factorised_in_double(monkeypatch):
+    """A condition number of 1e9: refinement diverges. Later matrices stay in double precision."""
+    solver = single_solver(monkeypatch)
+    rng = np.random.default_rng(3)
+    Q = np.linalg.qr(rng.standard_normal((60, 60)))[0]
+    A, b = Q @ np.diag(np.logspace(0, -9, 60)) @ Q.T, rng.standard_normal(60)
+    solver.factor(upper(A))
+    assert solver.factors.single
+    assert np.abs(A @ solver.solve(b) - b).max() <= linear.RESIDUAL_LIMIT * np.abs(b).max()
+    assert not solver.factors.single
+    solver.factor(upper(A + np.eye(60)))
+    assert not solver.factors.single
+    solver.release()
+
+
+@pytest.mark.skipif(len(BACKENDS) == 1, reason="pypardiso is not installed")
+def test_both_precisions_give_the_same_equilibrium(monkeypatch):
+    held = [PrescribedDisplacement(lambda x: x[2] < 1e-9)]
+    problem = Problem(block(skew=0.1), NeoHookean(1.0, 1000.0), [*held, *pulled()])
+    states = [equilibrium_path(problem, [1.0], NewtonSettings(solver="pardiso"))[0]]
+    monkeypatch.setattr(linear, "SINGLE_FROM", 10)
+    states.append(equilibrium_path(problem, [1.0], NewtonSettings(solver="pardiso"))[0])
+    np.testing.assert_allclose(states[1].u, states[0].u, atol=1e-9)
 
 
 @pytest.mark.skipif(len(BACKENDS) == 1, reason="pypardiso is not installed")
 def test_both_backends_give_the_same_equilibrium():
-    held = [
-        *symmetry(),
-        PrescribedDisplacement(lambda x: x[2] > 1 - 1e-9, (0, 1, 2), lambda t: (0.0, 0.1 * t, -0.2 * t)),
-    ]
-    problem = Problem(block(skew=0.1), NeoHookean(1.0, 1000.0), held[2:])
+    problem = Problem(block(skew=0.1), NeoHookean(1.0, 1000.0), [symmetry()[2], *pulled()])
     states = [equilibrium_path(problem, [1.0], NewtonSettings(solver=backend))[0] for backend in BACKENDS]
     np.testing.assert_allclose(states[0].u, states[1].u, atol=1e-9)
     np.testing.assert_allclose(states[0].held_force, states[1].held_force, atol=1e-7)
