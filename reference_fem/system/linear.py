@@ -104,7 +104,7 @@ class PardisoFactors:
         if afresh or not self.analysed:
             self.release()
             self.analysed = False
-        self.upper = upper.astype(np.float32) if single else upper
+        self.upper = sp.csr_matrix(upper, dtype=np.float32 if single else float)
         nothing = np.zeros(len(upper.indptr) - 1, self.upper.dtype)
         if not self.analysed:
             self.solver.iparm[27] = int(single)
