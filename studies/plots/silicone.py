@@ -1,5 +1,6 @@
 """The silicone beam: sag, frequency and damping against the tip load, measured and predicted."""
 
+import itertools
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -12,7 +13,7 @@ from studies.plots.style.page import blank, finish, page, panels
 from studies.plots.style.style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VERMILLION, save, styled
 
 TITLE = "A silicone beam let go: E and damping fitted without a load, the rest predicted"
-LOOKS = tuple(zip((BLUE, SKY, GREEN, ORANGE, PURPLE, GREY, BLACK), "os^vDsX", strict=True))
+LOOKS = tuple(zip((BLUE, SKY, GREEN, ORANGE, PURPLE, GREY, BLACK, VERMILLION, BLUE, GREEN), "os^vDsXP*<", strict=True))
 MEASURED = "measured"
 REACH = {"sag": 6.0, "frequency": 15.0}
 """Of the axes, in their units: what is farther off is named in a note."""
@@ -53,7 +54,7 @@ def figure(rows: Sequence[Point], bars: Mapping[str, Sequence[Bar]]) -> Figure:
         "damping": "damping ratio [1]",
     }
     names = list(dict.fromkeys(row.who for row in rows if row.who != MEASURED))
-    looks = dict(zip(names, LOOKS, strict=False))
+    looks = dict(zip(names, itertools.cycle(LOOKS), strict=False))
     beyond = list[str]()
     for axes, (quantity, measured) in zip(panels(sheet, 1, 3)[0], bars.items(), strict=True):
         beyond += _draw(axes, quantity, rows, measured, looks)

@@ -1,6 +1,6 @@
 """What the repository shows: tables, charts and the summaries on its pages, from results that the present code made."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Sequence, Set
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -112,7 +112,7 @@ def publish(root: Path, studies: Sequence[Study], home: Path) -> tuple[list[Path
     kept = {*absent, *APART} - {study.name for study in studies}
     _remove([file for file in _files(target) if not kept & _names(file, target)], copies)
     copies.append(note(target, {name: code() for name, code in _codes(studies, made).items()}))
-    show_sentences(studies, home)
+    show_sentences({study.name for study in studies} | {*made}, home)
     return copies, absent
 
 
@@ -148,7 +148,7 @@ def publish_some(root: Path, studies: Sequence[Study], home: Path, extras: Seque
     old = [file for name in names for file in _files(target / name) if not kept & _names(file, target)]
     _remove(old, copies)
     copies.append(note(target, {name: code() for name, code in _codes(studies, extras, whole=False).items()}))
-    show_sentences(studies, home)
+    show_sentences({study.name for study in studies} | {*extras}, home)
     return copies
 
 
@@ -262,12 +262,11 @@ def show_summaries(root: Path, studies: Sequence[Study], home: Path) -> None:
         write_whole(page, text.encode())
 
 
-def show_sentences(studies: Sequence[Study], home: Path) -> None:
-    """Puts the findings that concern these studies between their marks in the pages below `home`.
+def show_sentences(names: Set[str], home: Path) -> None:
+    """Puts the findings that concern these studies and EXTRAS between their marks in the pages below `home`.
 
     They read the published tables. Raises StudyError where a table, a page or its marks are missing.
     """
-    names = {study.name for study in studies}
     for sentences in (each for each in SENTENCES if names & set(each.studies)):
         page = home / sentences.page
         text = between(_read(page), sentences.marks, sentences.written(home / PUBLISHED), page)

@@ -28,8 +28,8 @@ JOBS = 2
 """Processes of a study."""
 MINUTES = {
     "make study-peers": 60.0,
-    "make study-league": 240.0,
-    "python -m studies.exchange.peers.main --sweep": 60.0,
+    "make study-league": 30.0,
+    "python -m studies.exchange.peers.main --sweep": 15.0,
     "organbench verify": 20.0,
     "organbench report --figures": 5.0,
     "make bench": 20.0,

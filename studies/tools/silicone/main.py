@@ -1,6 +1,5 @@
 """`python -m studies.tools.silicone.main`: the silicone beam predicted by both solvers, as a table and a chart."""
 
-import csv
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -23,6 +22,7 @@ from studies.tools.silicone.predict import (
     measured_row,
     reference_rows,
 )
+from studies.tools.silicone.table import write_table
 
 REFERENCE, COARSER = "reference", "reference, coarser mesh"
 
@@ -55,17 +55,13 @@ def bars() -> dict[str, list[Bar]]:
 
 def main(results: Annotated[Path, typer.Option(help="folder of the results")] = Path("results")) -> None:
     """Fits E and the damping on the unloaded beam, predicts the loaded ones (about ten minutes)."""
-    folder, rows = results / "silicone", []
+    folder, rows = results / "silicone", list[Point]()
     folder.mkdir(parents=True, exist_ok=True)
-    with (folder / "silicone.csv").open("w", newline="") as file:
-        table = csv.writer(file, lineterminator="\n")
-        table.writerow(("who", "tip load [N]", "sag [mm]", "frequency [Hz]", "damping ratio [1]"))
-        for row in predicted():
-            rows.append(row)
-            table.writerow((row.who, row.newton, *(f"{value:.4f}" for value in row[2:])))
-            file.flush()
-            values = f"{row.sag:.2f} mm, {row.frequency:.3f} Hz, {row.damping:.4f}"
-            print(f"{row.who}, {row.newton:g} N: {values}", flush=True)
+    for row in predicted():
+        rows.append(row)
+        write_table(folder / "silicone.csv", rows)
+        values = f"{row.sag:.2f} mm, {row.frequency:.3f} Hz, {row.damping:.4f}"
+        print(f"{row.who}, {row.newton:g} N: {values}", flush=True)
     draw(rows, bars(), folder / "silicone.png")
     set_stamp(results, "silicone")
 

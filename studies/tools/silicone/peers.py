@@ -1,12 +1,12 @@
-"""`python -m studies.tools.silicone.peers`: other programs let the silicone beam go; rows of silicone.csv.
+"""`python -m studies.tools.silicone.peers`: other programs let the silicone beam go: silicone.csv and its chart.
 
 Each gets the beam as a folder, as it gets a scene: `scene.json` has the masses at the tip too.
 """
 
-import csv
 import json
 import sys
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -17,13 +17,15 @@ from studies.base.errors import StudyError
 from studies.base.lookup import lookup
 from studies.exchange.peers.contest import PEERS, Attempt, Peer, hand_over
 from studies.geometry.files.grids import write_grid_file
-from studies.plots.silicone import Point
+from studies.plots.silicone import Point, draw
 from studies.scene.library import BALL_CLAMPED
 from studies.store.record import Status
 from studies.tools.silicone.beam import DENSITY, POISSON, SIDE, Beam, glued, hung, marker_sag, shear_modulus
+from studies.tools.silicone.main import bars
 from studies.tools.silicone.measured import GRAVITY, LOADS, Load
 from studies.tools.silicone.predict import DURATION, FINE, fitted_damping, fitted_youngs
 from studies.tools.silicone.swing import swing_of
+from studies.tools.silicone.table import read_table, write_table
 
 FRAME = 0.01
 """Between the moments that are handed in [s]."""
@@ -90,14 +92,15 @@ def main(
     youngs: Annotated[float | None, typer.Option(help="E [Pa]; default: fitted to the unloaded beam")] = None,
     only: Annotated[str, typer.Option(help="one program by its name")] = "",
 ) -> None:
-    """Appends the rows of programs to silicone.csv, which `python -m studies.tools.silicone.main` makes; what cannot be
-    done is said on standard error. Raises StudyError for an unknown program, without that table, and where no program
-    releases the beam."""
+    """Puts the rows of programs into silicone.csv, in place of those they have there, and draws the chart again; what
+    cannot be done is said on standard error. `python -m studies.tools.silicone.main` makes the table first. Raises
+    StudyError for an unknown program, without the table, and where no program releases the beam."""
     if only:
         lookup(only, [peer.name for peer in PEERS], "program (--only)")
     table, written = results / "silicone" / "silicone.csv", 0
     if not table.is_file():
         raise StudyError(f"there is no table {table} to add rows to; `python -m studies.tools.silicone.main` makes it")
+    rows = read_table(table)
     stiff = youngs if youngs is not None else fitted_youngs(FINE)
     with tempfile.TemporaryDirectory() as folder:
         for peer in (one for one in PEERS if only in ("", one.name)):
@@ -107,13 +110,18 @@ def main(
                 except StudyError as problem:
                     print(f"{peer.name}, {load.newton:g} N: {problem}", file=sys.stderr, flush=True)
                     break
-                with table.open("a", newline="", encoding="utf-8") as file:
-                    values = (f"{value:.4f}" for value in row[2:])
-                    csv.writer(file, lineterminator="\n").writerow((row.who, row.newton, *values))
+                rows = with_row(rows, row)
+                write_table(table, rows)
                 print(f"{row.who}, {row.newton:g} N: {row.sag:.2f} mm, {row.frequency:.3f} Hz, {row.damping:.4f}")
                 written += 1
     if not written:
         raise StudyError("no program released the beam; the lines above say why")
+    draw(rows, bars(), table.with_suffix(".png"))
+
+
+def with_row(rows: Sequence[Point], row: Point) -> list[Point]:
+    """`rows` and the row, in place of one of the same program and load."""
+    return [*(one for one in rows if (one.who, one.newton) != (row.who, row.newton)), row]
 
 
 if __name__ == "__main__":

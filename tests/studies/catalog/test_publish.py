@@ -296,5 +296,10 @@ def test_extras_are_published_by_name(current, home, organbench, refused, monkey
     set_stamp(current, "silicone")
     (home / PUBLISHED / "silicone").mkdir(parents=True)
     (home / PUBLISHED / "silicone" / "older.png").write_text("old")
+    findings = Sentences("README.md", "findings", ("silicone",), lambda published: ["made of silicone"])
+    monkeypatch.setattr(publishing, "SENTENCES", (findings,))
+    begin, end = findings.marks
+    (home / "README.md").write_text(f"# Title\n{begin}\nold\n{end}\n")
     assert organbench(*words)[0] == 0
+    assert (home / "README.md").read_text() == f"# Title\n{begin}\n- made of silicone\n{end}\n"
     assert [file.name for file in (home / PUBLISHED / "silicone").iterdir()] == ["silicone.csv"]
