@@ -12,6 +12,7 @@ from studies.plots import force_path, laws, methods, volume_history
 from studies.plots.campaigns import recovery, stability
 from studies.plots.style.bodies import body_looks
 from studies.plots.style.style import BLACK, BODY_LOOKS, SPARE_LOOKS, VERMILLION, method_colour, styled
+from studies.runs.case import VIRTUAL
 from studies.scene.library.stomach_press import STOMACH_PRESS
 from tests.plots.made_up import run
 from tests.plots.reading import words
@@ -51,6 +52,8 @@ def test_bodies_of_one_method_have_the_colours_of_their_families():
     surface, coarse, fine = body_looks([run(kind="surface"), run(), run(nodes=350)]).values()
     assert surface.colour("implicit_volume") == BLACK
     assert coarse.colour("implicit_volume") == fine.colour("implicit_volume") == VERMILLION
+    whole, virtual = body_looks([run(nodes=700), run(nodes=350, recipe={"cut": VIRTUAL})]).values()
+    assert whole.colour("implicit_volume") == VERMILLION != virtual.colour("implicit_volume")
     (alone,) = body_looks([run()]).values()
     assert alone.colour("implicit_volume") == method_colour("implicit_volume")
 

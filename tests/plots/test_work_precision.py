@@ -9,7 +9,7 @@ from studies.meshing.true_surface import ShapeErrors
 from studies.metrics.judged import front
 from studies.metrics.metrics import METRICS
 from studies.plots import work_precision as work
-from studies.plots.style.families import CONTESTANTS, FAMILIES, PAPER, family_of
+from studies.plots.style.families import CONTESTANTS, FAMILIES, PAPER, VIRTUAL_NODES, family_of
 from studies.plots.style.style import BLACK, BLUE, GREY, VERMILLION
 from studies.scene.library import JUDGED
 from studies.scene.library.ball_clamped import BALL_CLAMPED
@@ -130,7 +130,7 @@ def test_every_scene_has_two_panels_below_one_another():
 
 
 def test_families_are_told_apart_without_colour():
-    looks = [*FAMILIES.values(), *CONTESTANTS.values()]
+    looks = [*FAMILIES.values(), VIRTUAL_NODES, *CONTESTANTS.values()]
     assert len({look.marker for look in looks}) == len({look.colour for look in looks}) == len(looks)
     assert family_of(LADDER[0].case).colour == BLACK and family_of(LADDER[1].case).colour == VERMILLION
     assert family_of(LADDER[3].case).colour == BLUE

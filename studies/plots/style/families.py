@@ -18,7 +18,7 @@ from studies.plots.style.style import (
     YELLOW,
     method_colour,
 )
-from studies.runs.case import ADAPTIVE, Case
+from studies.runs.case import ADAPTIVE, VIRTUAL, Case
 
 PAPER = "the paper's body"
 
@@ -48,6 +48,7 @@ FAMILIES: dict[tuple[str, bool | str, str], Family] = {
     ("tetrahedral", True, "scene"): Family("tetrahedra, graded", MUTED[4], "v"),
 }
 """By kind of body, whether it is graded, and its volumes; colours by Okabe and Ito, no two markers alike."""
+VIRTUAL_NODES = Family("tetrahedra, virtual nodes along a cut", MUTED[8], "8")
 CONTESTANTS: dict[tuple[str, str], Family] = {
     ("explicit_elements", "tetrahedral"): Family("explicit elements, linear", MUTED[7], "<"),
     ("explicit_elements", "quadratic"): Family("explicit elements, quadratic", MUTED[2], ">"),
@@ -71,7 +72,7 @@ def family_of(case: Case) -> Family:
     if element is not None:
         return element
     volumes = SMOOTH if body.law == edge_smoothed.__name__ else body.volumes
-    known = FAMILIES.get((body.kind, body.graded, volumes))
+    known = VIRTUAL_NODES if body.cut == VIRTUAL else FAMILIES.get((body.kind, body.graded, volumes))
     if known is not None and case.method.name == WHOLE:
         return known
     if (
