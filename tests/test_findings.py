@@ -76,9 +76,17 @@ def test_a_scene_without_an_accurate_body_says_by_how_much_it_misses(published):
     assert "kidney_probe misses the target of 3 % for force with 3.5 %" in changed(published, "accuracy", spoil)
 
 
+def test_other_programs_are_judged_on_every_scene_and_not_on_that_of_the_search_alone(published):
+    def spoil(rows):
+        chosen = (rows["engine"] == "felupe") & (rows["scene"] == "kidney_probe")
+        rows.loc[chosen, ["force_end [%]", "mean_error [%]"]] = -44.4, 55.5
+
+    assert "1.6 to 44.4 and 1.6 to 55.5 % for FElupe's quadratic elements" in changed(published, "league", spoil)
+
+
 def test_a_missing_table_is_one_sentence(published):
-    (published / "peers" / "peers.csv").unlink()
-    with pytest.raises(StudyError, match=r"there is no table .*peers.csv .*`organbench publish peers` writes it"):
+    (published / "league" / "league.csv").unlink()
+    with pytest.raises(StudyError, match=r"there is no table .*league.csv .*`organbench publish league` writes it"):
         HEADLINE.written(published)
 
 
