@@ -20,6 +20,8 @@ from studies.geometry.mesh.organ_mesh import OrganMesh
 from studies.scene.scene import Scene
 
 DESCRIPTION, README = "scene.json", "README.md"
+SOFA = Path(__file__).parent / "peers" / "sofa_scene.py"
+"""Handed out as it is."""
 DIGITS = 12
 """Of a number: 3.6 and not 3.5999999999999996."""
 
@@ -42,6 +44,7 @@ def export(scene: Scene, folder: Path, nodes: int, rows: Sequence[Sequence[str]]
     write_whole(written[-1], paths_table(scene).to_csv(index=False, float_format=f"%.{DIGITS}g").encode())
     found = rounded(description(scene, meshes, why_not))
     texts = {DESCRIPTION: json.dumps(found, indent=1) + "\n", README: readme(found, nodes, rows), NAME: SOLVER}
+    texts[SOFA.name] = SOFA.read_text(encoding="utf-8")
     for name, text in texts.items():
         written.append(folder / name)
         write_whole(written[-1], text.encode())

@@ -119,6 +119,7 @@ def test_the_league_is_published_from_its_entries_alone(organbench, refused, ent
     """Table, chart and page; an entry that other code judged is refused."""
     (tmp_path / "home").mkdir()
     monkeypatch.chdir(tmp_path / "home")
+    monkeypatch.setattr(publish, "SENTENCES", ())  # this home has no pages
     results, published = tmp_path / "results", tmp_path / "home" / PUBLISHED
     assert "results/league is missing; run `make study-league` first" in refused(
         "publish", "league", "--results", results
