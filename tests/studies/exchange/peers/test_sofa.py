@@ -12,7 +12,7 @@ import pytest
 
 from studies.exchange.export import SOFA, export
 from studies.exchange.league.entry_file import judged_file, read_entry_file
-from studies.scene.library import BALL_CLAMPED, BALL_SQUEEZE, LIVER_PROBE, STOMACH_PROBE
+from studies.scene.library import BALL_CLAMPED, BALL_SQUEEZE, LIVER_PROBE
 from studies.store.record import Status
 
 NODES = 150
@@ -160,7 +160,9 @@ def test_what_it_hands_in_is_an_entry_of_the_league(scene_file, tmp_path):
     assert json.loads((tmp_path / "sofa.json").read_text())["settings"]["poisson"] == sofa.POISSON
 
 
-def test_a_scene_that_it_cannot_do_ends_with_a_sentence(scene_file):
-    sofa = scene_file(STOMACH_PROBE)
+def test_a_scene_that_it_cannot_do_ends_with_a_sentence(scene_file, tmp_path):
+    sofa = scene_file(LIVER_PROBE)
+    described = json.loads((tmp_path / "scene.json").read_text())
+    (tmp_path / "scene.json").write_text(json.dumps(described | {"lumen": {}}))
     with pytest.raises(SystemExit, match="it knows solid organs, not a wall round a lumen"):
         sofa.createScene(Node("root"))
