@@ -10,10 +10,10 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from studies.plots.style.page import blank, finish, page, panels
-from studies.plots.style.style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VERMILLION, save, styled
+from studies.plots.style.style import BLACK, BLUE, GREEN, GREY, MUTED, ORANGE, PURPLE, SKY, VERMILLION, save, styled
 
 TITLE = "A silicone beam let go: E and damping fitted without a load, the rest predicted"
-LOOKS = tuple(zip((BLUE, SKY, GREEN, ORANGE, PURPLE, GREY, BLACK, VERMILLION, BLUE, GREEN), "os^vDsXP*<", strict=True))
+LOOKS = tuple(zip((BLUE, SKY, GREEN, ORANGE, PURPLE, GREY, BLACK, *MUTED[:3]), "os^vDsXP*<", strict=True))
 MEASURED = "measured"
 REACH = {"sag": 6.0, "frequency": 15.0}
 """Of the axes, in their units: what is farther off is named in a note."""

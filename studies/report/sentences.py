@@ -348,17 +348,18 @@ def _range(values: Iterable[float], digits: int = 0) -> str:
 
 
 LEAGUE = ("league", "league/sweep.csv")
+"""What other programs are judged by."""
 SENTENCES = (
     Sentences(
         "README.md",
         "findings",
-        ("volume_loss", "frame_rate", "accuracy", "cutting", "league", "league/sweep.csv"),
+        ("volume_loss", "frame_rate", "accuracy", "cutting", *LEAGUE),
         headline,
     ),
     Sentences(
         "docs/findings.md",
         "answers",
-        ("methods", "laws", "literature", "league", "league/sweep.csv", "stress"),
+        ("methods", "laws", "literature", *LEAGUE, "stress"),
         answers,
     ),
     Sentences("docs/limits.md", "limits", ("volume_loss", "accuracy"), limits),

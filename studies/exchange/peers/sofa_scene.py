@@ -2,9 +2,10 @@
 
     python sofa_scene.py
 
-writes sofa.npz and, for scenes of the league, sofa.json: hand it in with `organbench judge SCENE sofa.json`. Corotated
-linear tetrahedra, implicit Euler steps, a sparse direct solver, penalty contact at nodes. The authors of organbench
-could not run it: SOFA is not on PyPI.
+writes sofa.npz and sofa.json. Hand in sofa.json for a scene and a mesh of the league, sofa.npz for any other:
+`organbench judge SCENE sofa.npz`. Corotated linear tetrahedra, implicit Euler steps, a sparse direct solver, penalty
+contact at nodes. The file stands alone, so it has its own copy of what the other adapters share. The authors of
+organbench could not run it: SOFA is not on PyPI.
 """
 
 # SOFA is not installed where this file is checked.
@@ -32,7 +33,7 @@ STIFFNESS = 20.0
 AVERAGED = 20
 """The force is the mean over so many steps before a checkpoint."""
 SET = "OB-2027.1"
-"""Of the league; other scenes have no entry file."""
+"""Of the league, which takes no entry of other scenes."""
 PLUGINS = (
     "Constraint.Projective",
     "LinearSolver.Direct",
