@@ -7,7 +7,7 @@ PYTEST := PYTHONDONTWRITEBYTECODE= OMP_NUM_THREADS=1 $(BIN)/python -m pytest -q 
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help demo study study-peers study-league report publish publish-plan verify smoke test check lint docs links figures fuzz stress bench speeds \
+.PHONY: help demo study study-league report publish publish-plan verify smoke test check lint docs links figures fuzz stress bench speeds \
 	coverage clean distclean compiled \
 	compiled-essential setup-run \
 	setup-test setup-verify setup-dev FORCE
@@ -30,13 +30,8 @@ study-%: setup-run ## run one study and draw it: make study-volume_loss
 report: setup-run ## charts, tables and report.html, one page that opens anywhere, from the stored results
 	$(BIN)/organbench report
 
-study-peers: setup-run ## other programs, in environments of their own, and ours on the same ball and liver (minutes)
-	$(BIN)/organbench run studies/exchange/peers/study.py
+study-league: setup-run ## all programs and ours on the open scenes of the league, each in an environment of its own (half an hour)
 	$(BIN)/python -m studies.exchange.peers.main
-	$(BIN)/organbench plot studies/exchange/peers/study.py
-
-study-league: setup-run ## all programs and ours on the open scenes of the league (an hour)
-	$(BIN)/python -m studies.exchange.peers.main --league
 	$(BIN)/organbench report
 
 publish: setup-run compiled ## all that is published, again, by this commit on this machine (hours; goes on where it was interrupted)

@@ -11,7 +11,6 @@ import typer
 
 from studies.catalog import STUDIES
 from studies.cli.app import app
-from studies.exchange.peers.study import STUDY as PEERS
 from studies.report.publish import EXTRAS
 
 ROOT = Path(__file__).parent.parent
@@ -52,7 +51,7 @@ def test_readme_is_short_and_pages_are():
 
 def test_charts_of_the_pages_are_those_that_are_made():
     linked = {link for page in PAGES for link in re.findall(r"results/published/(\w+)/(\w+\.png)\)", read(page))}
-    made = {(study.name, chart.file) for study in (*STUDIES, PEERS) for chart in study.charts}
+    made = {(study.name, chart.file) for study in STUDIES for chart in study.charts}
     assert len(linked) > 10
     assert {link for link in linked if link[0] not in (*EXTRAS, "reference", "population", "silicone")} <= made
 
@@ -102,7 +101,7 @@ def test_commands_of_a_page_exist(page):
 def test_targets_of_make_exist():
     targets = re.findall(r"^([\w%/.-]+(?: [\w%/.-]+)*):", read(ROOT / "Makefile"), re.M)
     names = {name for line in targets for name in line.split()}
-    made = {f"study-{study.name}" for study in STUDIES} | {"study-population", "study-peers"}
+    made = {f"study-{study.name}" for study in STUDIES} | {"study-population"}
     for page in PAGES:
         if page.name != HISTORY:
             for name in re.findall(r"(?:`|^    )make ([\w-]+)", read(page), re.M):

@@ -13,7 +13,7 @@ from studies.geometry.organs.make_shape import make_shape
 from studies.geometry.surface.family import true_volume
 from studies.reference.solve import VARIANTS
 from studies.report.publish import PUBLISHED
-from studies.report.sentences import APART, NODAL, SENTENCES, TOGETHER
+from studies.report.sentences import APART, NODAL, SENTENCES, TOGETHER, real_time
 from studies.report.summary import SUMMARIES
 from studies.scene.library import BALL_SQUEEZE, LIVER_PRESS
 from studies.scene.library.ball_squeeze import RADIUS
@@ -74,6 +74,15 @@ def test_a_scene_without_an_accurate_body_says_by_how_much_it_misses(published):
         rows.loc[rows["scene"] == "kidney_probe", "force_end [%]"] = 3.5
 
     assert "kidney_probe misses the target of 3 % for force with 3.5 %" in changed(published, "accuracy", spoil)
+
+
+def test_a_scene_that_is_slower_than_real_time_is_named(published):
+    path = published / "accuracy" / "accuracy.csv"
+    rows = pd.read_csv(path)
+    rows.loc[rows["scene"] == "ball_squeeze", "real_time [s/s]"] /= 10.0
+    rows.to_csv(path, index=False)
+    (sentence,) = real_time(published)
+    assert "in 6 of the 8 scenes" in sentence and "ball_squeeze reaches 0.4 times real time" in sentence
 
 
 def test_other_programs_are_judged_on_every_scene_and_not_on_that_of_the_search_alone(published):

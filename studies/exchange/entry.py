@@ -28,8 +28,6 @@ FOLDER = "entries"
 """Of the results."""
 ENTRY, SECONDS = "entry", "entry_seconds"
 """Attributes of its record."""
-HALF_STEP = "-half_step"
-"""End of the name of an entry with steps half as long, which shows whether the answer hangs on the step."""
 
 
 @dataclass(frozen=True)

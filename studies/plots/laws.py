@@ -142,7 +142,7 @@ def _handles(looks: dict[int, Look]) -> list:
         *(Line2D([], [], color=colour, linewidth=4, label=readable(law)) for law, colour in laws.items()),
         *(Line2D([], [], linestyle=line, marker=m, markerfacecolor=_face(BLACK, m), color=BLACK, label=words)
           for words, line, m in volumes),
-        band_handle("the reference's own uncertainty"),
+        band_handle("uncertainty of the reference"),
     ]  # fmt: skip
 
 

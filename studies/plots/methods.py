@@ -144,7 +144,7 @@ def _handles(scenes: dict[str, list[Run]], metrics: Sequence[Metric]) -> list:
         colour, marker = SCENE_LOOKS[number % len(SCENE_LOOKS)]
         label = heading(name) + unresolved_mark(group, metrics)
         entries.append(Line2D([], [], color=colour, marker=marker, linestyle="", markersize=7, label=label))
-    dotted = Line2D([], [], color=GREY, linestyle=":", label="the reference's own uncertainty")
+    dotted = Line2D([], [], color=GREY, linestyle=":", label="uncertainty of the reference")
     return [*entries, dotted, hollow_handle(GREY)]
 
 

@@ -42,7 +42,7 @@ from studies.tools.verify.verification import FOLDER as VERIFY
 
 PUBLISHED = Path("results") / "published"
 """Below the folder of README.md; the only part of results/ that git keeps."""
-PEERS, SWEEP = "peers", f"{LEAGUE}/{SWEEP_TABLE}"
+SWEEP = f"{LEAGUE}/{SWEEP_TABLE}"
 FUZZ = "studies.tools.fuzz"
 ADAPTERS = tuple(sorted({peer.module for peer in (*PROGRAMS, *OURS) if peer.module}))
 
@@ -81,7 +81,7 @@ EXTRAS = {
     SWEEP: Extra("python -m studies.exchange.peers.main --sweep", ("studies.exchange.peers.main", *ADAPTERS)),
 }
 """What was not made again stays as published."""
-APART = (POPULATION, PEERS)
+APART = (POPULATION,)
 """Studies outside of the catalogue: published when they are asked for, and kept meanwhile."""
 REFERENCES, KEPT = "reference", "kept_volume.csv"
 """Made of all studies of the catalogue."""
@@ -128,8 +128,6 @@ def publish_some(root: Path, studies: Sequence[Study], home: Path, extras: Seque
         if not is_made(root, name):
             raise StudyError(f"not published: {root / name} is missing; run `{EXTRAS[name].command}` first")
     check_extras(root, extras)
-    if PEERS in {study.name for study in studies}:
-        check_entries(root, "make study-peers")
     for study in studies:
         written, missing = refresh(ledger, study)
         if missing and not study.counts_losses:
@@ -197,7 +195,7 @@ def check(home: Path, studies: Sequence[Study]) -> list[Finding]:
         raise StudyError(f"there is no {target}; run the command in the folder of the project")
     commands = {study.name: command_line("run", [study]) for study in studies}
     commands |= {one.file: commands[one.study] for one in SUMMARIES if one.study in commands}
-    commands |= {PEERS: "make study-peers"} | {name: extra.command for name, extra in EXTRAS.items()}
+    commands |= {name: extra.command for name, extra in EXTRAS.items()}
     every = "make publish"
     catalogue = [study for study in studies if study.name not in APART]
     makers = _codes(catalogue, list(EXTRAS)) | _codes([s for s in studies if s.name in APART], (), whole=False)

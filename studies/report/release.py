@@ -16,7 +16,7 @@ import typer
 from reference_fem import crosscheck
 from studies.base.errors import StudyError
 from studies.catalog import STUDIES, Study
-from studies.report.publish import APART, EXTRAS, KEPT, LEAGUE, PEERS, PUBLISHED, REFERENCES, SWEEP
+from studies.report.publish import APART, EXTRAS, KEPT, LEAGUE, PUBLISHED, REFERENCES, SWEEP
 from studies.report.published_code import FILE
 from studies.report.summary import SUMMARIES
 from studies.store.ledger import Ledger
@@ -27,7 +27,6 @@ from studies.sweep.plan import expected, plan
 JOBS = 2
 """Processes of a study."""
 MINUTES = {
-    "make study-peers": 60.0,
     "make study-league": 30.0,
     "python -m studies.exchange.peers.main --sweep": 15.0,
     "organbench verify": 20.0,
@@ -67,9 +66,8 @@ def steps(studies: Sequence[Study] = STUDIES) -> list[Step]:
     alone = {one.study: one.file for one in SUMMARIES if "/" not in one.file}
     found = [
         Step(f"organbench run {name}", (name, alone[name]) if name in alone else (name,), name)
-        for name in [*(study.name for study in studies), *(name for name in APART if name != PEERS)]
+        for name in [*(study.name for study in studies), *APART]
     ]
-    found.append(Step("make study-peers", (PEERS,)))
     order = [SWEEP, LEAGUE, *EXTRAS]  # settings of the league come from the sweep
     commands = dict.fromkeys(EXTRAS[name].command for name in order)
     found += [Step(c, tuple(name for name, extra in EXTRAS.items() if extra.command == c)) for c in commands]

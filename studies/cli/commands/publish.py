@@ -1,20 +1,16 @@
 """`organbench publish`: what the repository shows becomes what is stored."""
 
-from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from studies.catalog import STUDIES, Study
+from studies.catalog import STUDIES
 from studies.catalog.population import POPULATION
 from studies.cli.terminal import Results, say
-from studies.exchange.peers.study import STUDY
 from studies.report import publish as publishing
 from studies.report.published_code import CURRENT
 from studies.sweep.find_study import find_study
-
-PEERS = replace(STUDY, word="studies/exchange/peers/study.py")
 
 
 def publish(
@@ -33,7 +29,7 @@ def publish(
         return
     if studies:
         extras = [name for name in studies if name in publishing.EXTRAS]
-        chosen = [study_named(name) for name in studies if name not in extras]
+        chosen = [find_study(name) for name in studies if name not in extras]
         copies, absent = publishing.publish_some(results, chosen, Path("."), extras), []
     else:
         copies, absent = publishing.publish(results, STUDIES, Path("."))
@@ -44,15 +40,10 @@ def publish(
         say(f"kept as published: {again}")
 
 
-def study_named(name: str) -> Study:
-    """A study as find_study has it, and that of other programs by its name."""
-    return PEERS if name == PEERS.name else find_study(name)
-
-
 def check_published(names: list[str]) -> None:
     """Says of all that is published, or of these names, whether the present code would make it. Exit code 1: something
     is not current."""
-    found = publishing.check(Path("."), [*STUDIES, find_study(POPULATION), PEERS])
+    found = publishing.check(Path("."), [*STUDIES, find_study(POPULATION)])
     shown = [one for one in found if not names or one.name in names]
     for one in shown:
         say(f"{one.name}: {one.status}" + (f", {one.words}" if one.words else ""))

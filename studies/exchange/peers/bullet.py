@@ -118,13 +118,11 @@ class Deformable:
 def run(
     scene: SceneFolder,
     out: Path,
-    shorter: float = 1.0,
     *,
     step: float = STEP,
     lame: float = LAME,
     damping: float = DAMPING,
 ) -> None:
-    """Runs the scene with steps of `step` × shorter and hands it in."""
-    dt = step * shorter
-    body = Deformable(scene, dt, lame, damping)
-    march(scene, out, dt, body.step, body.force, body.positions)
+    """Runs the scene with steps of `step` and hands it in."""
+    body = Deformable(scene, step, lame, damping)
+    march(scene, out, step, body.step, body.force, body.positions)

@@ -14,7 +14,7 @@ from pathlib import Path
 
 from massspring.sources import own_file, source_fingerprint
 from studies.base.errors import StudyError
-from studies.exchange.entry import HALF_STEP, entry_path, outside
+from studies.exchange.entry import entry_path, outside
 from studies.exchange.export import export
 from studies.exchange.judge import unfinished_record
 from studies.exchange.league.entry_file import LEAGUE, EntryFile, judged_file, write_entry_file
@@ -73,7 +73,13 @@ PEERS: tuple[Peer, ...] = (
     Peer("torch-fem", absent="torch-fem 0.14.0 has no contact"),
 )
 OURS: tuple[Peer, ...] = (
-    Peer("ours-quadratic", ADAPTERS + "own", "curved", settings={"method": "implicit_volume"}, ours=True),
+    Peer(
+        "ours-quadratic",
+        ADAPTERS + "own",
+        "curved",
+        settings={"method": "implicit_volume", "mass": "stiffness"},
+        ours=True,
+    ),
     Peer(
         "ours-corotated",
         ADAPTERS + "own",
@@ -91,17 +97,16 @@ class Attempt:
     peer: Peer
     scene: Scene
     nodes: int
-    shorter: float = 1.0
 
     @property
     def name(self) -> str:
         """Of the entry."""
-        return self.peer.name if self.shorter == 1.0 else self.peer.name + HALF_STEP
+        return self.peer.name
 
     @property
     def words(self) -> list[str]:
         """After the module: what its adapter is called with, besides the folders."""
-        return [self.peer.mesh, repr(self.shorter), json.dumps(dict(self.peer.settings))]
+        return [self.peer.mesh, json.dumps(dict(self.peer.settings))]
 
 
 def contest(

@@ -140,14 +140,12 @@ class Deformable:
 def run(
     scene: SceneFolder,
     out: Path,
-    shorter: float = 1.0,
     *,
     step: float = STEP,
     poisson: float = POISSON,
     law: str = LAW,
     finest: float = FINEST,
 ) -> None:
-    """Runs the scene with steps of `step` × shorter and hands it in."""
-    dt = step * shorter
-    body = Deformable(scene, dt, poisson, law, finest)
-    march(scene, out, dt, body.step, lambda t: body.force(), body.positions, None, FORCES)
+    """Runs the scene with steps of `step` and hands it in."""
+    body = Deformable(scene, step, poisson, law, finest)
+    march(scene, out, step, body.step, lambda t: body.force(), body.positions, None, FORCES)

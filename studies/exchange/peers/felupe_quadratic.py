@@ -23,10 +23,8 @@ PENALTY = 1.0
 times the cost."""
 
 
-def run(
-    scene: SceneFolder, out: Path, shorter: float = 1.0, *, increments: int = INCREMENTS, penalty: float = PENALTY
-) -> None:
-    """Runs the scene with `increments` / shorter load steps to a checkpoint and hands it in."""
+def run(scene: SceneFolder, out: Path, *, increments: int = INCREMENTS, penalty: float = PENALTY) -> None:
+    """Runs the scene with `increments` load steps to a checkpoint and hands it in."""
     scene.check_simple()
     if np.any(scene.data["gravity"]):
         raise CannotDo("its adapter knows no weight")
@@ -45,10 +43,10 @@ def run(
     driven = [(path, axis, _fixed(displacement, nodes, axis)) for path, nodes in paths for axis in range(3)]
     tied = {} if scene.data["held"] else _tied(scene, displacement)
     boundaries = tied | {f"driven{number}": boundary for number, (_, _, boundary) in enumerate(driven)}
-    positions, forces, many = [scene.points], [0.0], round(increments / shorter)
+    positions, forces = [scene.points], [0.0]
     for before, now in zip(scene.times[:-1], scene.times[1:], strict=True):
         ends = [(moved(path, before)[axis], moved(path, now)[axis], boundary) for path, axis, boundary in driven]
-        ramp = {boundary: np.linspace(begin, end, many + 1) for begin, end, boundary in ends}
+        ramp = {boundary: np.linspace(begin, end, increments + 1) for begin, end, boundary in ends}
         step = felupe.Step(items=[body, *contacts], ramp=ramp, boundaries=boundaries)
         job = felupe.Job(steps=[step], plugins=[felupe.CutbackPlugin()])
         job.evaluate(x0=field, verbose=0, solver=spsolve)

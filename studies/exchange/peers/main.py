@@ -1,6 +1,6 @@
-"""`python -m studies.exchange.peers.main`: every other program on the ball and the liver, also with half its step.
+"""`python -m studies.exchange.peers.main`: every other program, and ours, on the open scenes of the frozen set.
 
-With `--league` each of them, and ours, on the open scenes of the frozen set; with `--sweep` their settings on one.
+With `--sweep` a search of their settings on two scenes.
 """
 
 import sys
@@ -16,9 +16,8 @@ from studies.base.lookup import lookup
 from studies.exchange.league import FOLDER
 from studies.exchange.league.frozen import frozen
 from studies.exchange.peers.contest import OURS, PEERS, TIME_LIMIT, Attempt, contest
-from studies.exchange.peers.study import NODES, SCENES
-from studies.exchange.peers.sweep import swept
-from studies.scene.library import SCENES as LIBRARY
+from studies.exchange.peers.sweep import NODES, swept
+from studies.scene.library import SCENES
 from studies.store.stamps import set_stamp
 
 TABLE = "sweep.csv"
@@ -28,11 +27,8 @@ def main(
     results: Annotated[Path, typer.Option(help="folder of the results")] = Path("results"),
     only: Annotated[str, typer.Option(help="one program by its name")] = "",
     limit: Annotated[float, typer.Option(min=1.0, help="seconds after which a run is ended")] = TIME_LIMIT,
-    league: Annotated[
-        bool, typer.Option("--league", help="on the open scenes of the frozen set, and ours too")
-    ] = False,
-    sweep: Annotated[bool, typer.Option("--sweep", help="several settings of each on one scene, as a table")] = False,
-    nodes: Annotated[int | None, typer.Option(help="vertices on the outer surface; default: 150, then 300")] = None,
+    sweep: Annotated[bool, typer.Option("--sweep", help="search the settings of each on two scenes")] = False,
+    nodes: Annotated[int, typer.Option(help="vertices on the outer surface")] = NODES,
     again: Annotated[bool, typer.Option("--again", help="also what is current")] = False,
     environments: Annotated[Path | None, typer.Option(help="folder of the programs' environments")] = None,
 ) -> None:
@@ -40,7 +36,7 @@ def main(
 
     Entries of the present code are kept, so that the same command goes on after an interruption.
     """
-    peers = (*PEERS, *(OURS if league else ()))
+    peers = PEERS if sweep else (*PEERS, *OURS)
     if only:
         lookup(only, [peer.name for peer in peers], "program (--only)")
     chosen = [peer for peer in peers if only in ("", peer.name)]
@@ -58,16 +54,9 @@ def main(
             if not only:
                 set_stamp(results, f"{FOLDER}/{TABLE}")
             return
-        scenes = [scene for scene in LIBRARY if scene.name in frozen()] if league else SCENES
-        attempts = [
-            Attempt(peer, scene, count, shorter)
-            for peer in chosen
-            for scene in scenes
-            for count in (NODES if nodes is None else (nodes,))
-            for shorter in ((1.0, 0.5) if count == NODES[0] and not peer.absent and not league else (1.0,))
-        ]
-        root = results / FOLDER if league else results
-        for record in contest(root, attempts, Path(folder), limit, homes, again):
+        scenes = [scene for scene in SCENES if scene.name in frozen()]
+        attempts = [Attempt(peer, scene, nodes) for peer in chosen for scene in scenes]
+        for record in contest(results / FOLDER, attempts, Path(folder), limit, homes, again):
             print(f"{record.name}: {record.status}" + (f", {record.message}" if record.message else ""), flush=True)
 
 

@@ -82,15 +82,13 @@ def _freedoms(model: mujoco.MjModel) -> np.ndarray:
 def run(
     scene: SceneFolder,
     out: Path,
-    shorter: float = 1.0,
     *,
     step: float = STEP,
     poisson: float = POISSON,
     stiff: float = 2.0,
 ) -> None:
-    """Runs the scene with steps of `step` × shorter and hands it in; stiff: time constant of contacts over the step."""
-    dt = step * shorter
-    model = model_of(scene, dt, poisson, stiff)
+    """Runs the scene with steps of `step` and hands it in; stiff: time constant of contacts over the step."""
+    model = model_of(scene, step, poisson, stiff)
     data, freedoms = mujoco.MjData(model), _freedoms(model)
     held = freedoms[scene.held]
     mujoco.mj_forward(model, data)
@@ -111,7 +109,7 @@ def run(
             return scene.along(-data.qfrc_spring[freedoms[nodes]].sum(axis=0))
         return abs(scene.along(_contact_force(model, data, asked)))
 
-    march(scene, out, dt, advance, force, positions)
+    march(scene, out, step, advance, force, positions)
 
 
 def _contact_force(model: mujoco.MjModel, data: mujoco.MjData, asked: int) -> np.ndarray:

@@ -72,7 +72,6 @@ def model_of(scene: SceneFolder, lame: float, penalty: float) -> tuple[Any, list
 def run(
     scene: SceneFolder,
     out: Path,
-    shorter: float = 1.0,
     *,
     step: float = STEP,
     sweeps: int = SWEEPS,
@@ -80,26 +79,26 @@ def run(
     penalty: float = PENALTY,
     facets: bool = True,
 ) -> None:
-    """Runs the scene with steps of `step` × shorter and hands it in; facets: whole facets touch, not nodes alone."""
+    """Runs the scene with steps of `step` and hands it in; facets: whole facets touch, not nodes alone."""
     wp.config.quiet = True
-    dt, held = step * shorter, scene.held
+    held = scene.held
     law = PlainStableNeoHookean(scene.points, scene.cells, scene.mu, lame * scene.mu)
     model, shapes = model_of(scene, lame, penalty)
     solver = newton.solvers.SolverVBD(model, iterations=sweeps, particle_enable_tile_solve=False)
     pipeline = newton.CollisionPipeline(model, enable_rigid_soft_full_surface_contact=facets)
     contacts, now, after, control = pipeline.contacts(), model.state(), model.state(), model.control()
     observed = solver.observables({solver.ObservableKind.CONTACT_F}, contacts=contacts)
-    kept = 1.0 / (1.0 + dt * scene.data["damping"]["rate"])
+    kept = 1.0 / (1.0 + step * scene.data["damping"]["rate"])
     positions, forces, sampled, spent = [scene.points], [0.0], [], 0.0
-    steps = np.round(scene.times / dt).astype(int)
-    _step(solver, pipeline, contacts, now, after, control, dt, observed)  # compiles; the body is at rest
+    steps = np.round(scene.times / step).astype(int)
+    _step(solver, pipeline, contacts, now, after, control, step, observed)  # compiles; the body is at rest
     for begin, end in pairwise(steps):
         started = time.process_time()
         for step_number in range(begin + 1, end + 1):
-            _place(model, shapes, scene, step_number * dt)
-            now.particle_q.numpy()[held] = after.particle_q.numpy()[held] = scene.held_at(step_number * dt)
+            _place(model, shapes, scene, step_number * step)
+            now.particle_q.numpy()[held] = after.particle_q.numpy()[held] = scene.held_at(step_number * step)
             watched = end - step_number < FORCES
-            _step(solver, pipeline, contacts, now, after, control, dt, observed if watched else None)
+            _step(solver, pipeline, contacts, now, after, control, step, observed if watched else None)
             after.particle_qd.numpy()[:] *= kept
             now, after = after, now
             if watched:
@@ -112,11 +111,11 @@ def run(
 
 
 def _step(
-    solver: Any, pipeline: Any, contacts: Any, now: Any, after: Any, control: Any, dt: float, observed: Any
+    solver: Any, pipeline: Any, contacts: Any, now: Any, after: Any, control: Any, step: float, observed: Any
 ) -> None:
     now.clear_forces()
     pipeline.collide(now, contacts)
-    solver.step(now, after, control, contacts, dt, observables=observed)
+    solver.step(now, after, control, contacts, step, observables=observed)
 
 
 def _placed(obstacle: dict[str, Any], t: float) -> Any:

@@ -3,6 +3,7 @@
 import time
 from dataclasses import replace
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 
@@ -17,23 +18,29 @@ from studies.scene.library import CUT, SCENES
 
 
 def run(
-    scene: SceneFolder, out: Path, shorter: float = 1.0, *, method: str, dt: float | None = None, **settings: object
+    scene: SceneFolder,
+    out: Path,
+    *,
+    method: str,
+    dt: float | None = None,
+    mass: Literal["lumped", "stiffness"] = "lumped",
+    **settings: object,
 ) -> None:
-    """Runs the scene by a method with its settings and hands it in; its steps are × shorter.
+    """Runs the scene by a method with its settings and hands it in.
 
-    dt: length of steps and frames [s]; default: the usual share of the stability limit.
+    mass: of a quadratic body (studies.runs.case.BodyRecipe). dt: length of steps and frames [s]; default: the usual
+    share of the stability limit.
     """
     known = lookup(scene.data["name"], {one.name: one for one in (*SCENES, *CUT)}, "scene")
     known = replace(known, checkpoints=tuple(float(t) for t in scene.times[1:]))
     kind = lookup(method, {one.name: one for one in METHODS}, "method")(**settings)
     recipe = given_mesh(known, int(scene.data["meshes"]["straight"]["outer_nodes"]), scene.mesh).recipe
+    recipe = replace(recipe, mass=mass)
     if kind.capabilities.keeps == "elements":
         recipe = replace(recipe, law="cotangent", volumes="nodal")  # springs without length, one volume per node
     case = Case(known, recipe, kind)
-    if dt is None:
-        case = replace(case, dt_fraction=case.dt_fraction * shorter)
-    else:
-        case = replace(case, dt=dt * shorter, frames=round(known.duration / (dt * shorter)))
+    if dt is not None:
+        case = replace(case, dt=dt, frames=round(known.duration / dt))
     if known.cut is not None:  # our bodies are cut in a run: after its first frame
         first = known.duration / (case.frames or known.frames)
         case = case.replaced(scene=replace(known, cuts=(replace(known.cut, at=first),)))

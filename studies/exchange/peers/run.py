@@ -1,4 +1,4 @@
-"""`python -m studies.exchange.peers.run MODULE FOLDER OUT MESH SHORTER SETTINGS`: one adapter on one exported scene.
+"""`python -m studies.exchange.peers.run MODULE FOLDER OUT MESH SETTINGS`: one adapter on one exported scene.
 
 The interpreter is that of the program's own environment. What it handed in gets the versions of all that is installed
 there.
@@ -14,7 +14,7 @@ from pathlib import Path
 from studies.exchange.peers.scene_folder import CANNOT, MISSING, CannotDo, SceneFolder
 
 
-def main(module: str, folder: str, out: str, mesh: str, shorter: str, settings: str) -> int:
+def main(module: str, folder: str, out: str, mesh: str, settings: str) -> int:
     """Exit code 0, CANNOT or MISSING with a sentence on standard error; anything else is the adapter's own error."""
     try:
         adapter = import_module(module)
@@ -22,7 +22,7 @@ def main(module: str, folder: str, out: str, mesh: str, shorter: str, settings: 
         print(f"{error.name} is not installed", file=sys.stderr)
         return MISSING
     try:
-        adapter.run(SceneFolder(Path(folder), mesh), Path(out), float(shorter), **json.loads(settings))
+        adapter.run(SceneFolder(Path(folder), mesh), Path(out), **json.loads(settings))
     except CannotDo as reason:
         print(reason, file=sys.stderr)
         return CANNOT

@@ -162,15 +162,13 @@ class Body:
         return values.reshape(len(values), 3, -1)
 
 
-def run(
-    scene: SceneFolder, out: Path, shorter: float = 1.0, *, increments: int = INCREMENTS, penalty: float = PENALTY
-) -> None:
-    """Runs the scene with `increments` / shorter load steps to a checkpoint and hands it in."""
+def run(scene: SceneFolder, out: Path, *, increments: int = INCREMENTS, penalty: float = PENALTY) -> None:
+    """Runs the scene with `increments` load steps to a checkpoint and hands it in."""
     started = time.process_time()
-    body, many = Body(scene, penalty), round(increments / shorter)
+    body = Body(scene, penalty)
     positions, forces = [scene.points], [0.0]
     for before, now in zip(scene.times[:-1], scene.times[1:], strict=True):
-        for begin, end in pairwise(np.linspace(before, now, many + 1).tolist()):
+        for begin, end in pairwise(np.linspace(before, now, increments + 1).tolist()):
             body.advance(begin, end)
         positions.append(body.positions())
         forces.append(body.force())

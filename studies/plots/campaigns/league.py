@@ -6,11 +6,25 @@ from dataclasses import dataclass
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from studies.plots.campaigns.peers import SPARE
 from studies.plots.style.page import blank, finish, log_axis, page, panels
-from studies.plots.style.style import BLACK, drawing, styled
+from studies.plots.style.style import (
+    BLACK,
+    BLUE,
+    GREEN,
+    MUTED,
+    ORANGE,
+    PURPLE,
+    SKY,
+    VERMILLION,
+    drawing,
+    styled,
+)
 
 TITLE = "What an engine solves within a budget: up and to the left is better"
+SPARE = tuple(
+    zip((ORANGE, GREEN, BLUE, PURPLE, BLACK, MUTED[2], MUTED[1], MUTED[0], SKY, VERMILLION), "^sDvX<>hP*", strict=True)
+)
+"""Colours and markers of the engines, in the order of their appearance."""
 Steps = Sequence[tuple[float, float]]
 
 

@@ -26,7 +26,7 @@ NARROWEST = 8.0
 """Width of a page with one panel [inch]."""
 HANDLE = 0.62
 """Width of a legend entry besides its words [inch]."""
-MOST_NOTES = 6
+MOST_NOTES = 8
 SHORT = 200.0
 """A logarithmic axis from one end to the other of which values grow less than this has numbers between the decades."""
 
@@ -190,7 +190,10 @@ def hollow_handle(colour: str) -> Line2D:
 
 
 def log_axis(axis: Axis) -> None:
-    """Plain numbers, not powers: 0.1, 1, 10, and 2 and 5 between them where the axis is short."""
+    """Plain numbers: 0.1, 1, 10, with 2 and 5 between them where the axis is short; powers of ten below 0.01."""
+
+    def decade(value: float, _: int) -> str:
+        return f"{value:g}" if value > 0.9e-2 else f"$10^{{{np.log10(value):.0f}}}$"
 
     def between(value: float, _: int) -> str:
         low, high = axis.get_view_interval()
@@ -198,7 +201,7 @@ def log_axis(axis: Axis) -> None:
         return f"{value:g}" if first in (2, 5) and high < SHORT * low else ""
 
     (axis.axes.set_xscale if isinstance(axis, XAxis) else axis.axes.set_yscale)("log")
-    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.set_major_formatter(FuncFormatter(decade))
     axis.set_minor_formatter(FuncFormatter(between))
     axis.set_tick_params(which="minor", labelsize=SMALL)
 

@@ -77,7 +77,7 @@ def test_findings_in_words_follow_the_tables_that_were_published(current, home, 
 
 
 def test_what_nothing_makes_any_more_goes_and_what_was_not_made_again_stays(current, home):
-    for name in ("volume_loss/older.png", "verify/verify.csv", "bench.csv", "peers/peers.csv"):
+    for name in ("volume_loss/older.png", "verify/verify.csv", "bench.csv", "population/population.csv"):
         (home / PUBLISHED / name).parent.mkdir(parents=True, exist_ok=True)
         (home / PUBLISHED / name).write_text("old")
     (current / "bench.csv").write_text("new")
@@ -85,7 +85,7 @@ def test_what_nothing_makes_any_more_goes_and_what_was_not_made_again_stays(curr
     publish(current, [HEADLINE], home)
     assert not (home / PUBLISHED / "volume_loss/older.png").exists()
     assert (home / PUBLISHED / "verify/verify.csv").read_text() == "old"
-    assert (home / PUBLISHED / "peers/peers.csv").read_text() == "old"
+    assert (home / PUBLISHED / "population/population.csv").read_text() == "old"
     assert (home / PUBLISHED / "bench.csv").read_text() == "new"
 
 

@@ -50,7 +50,7 @@ def test_what_is_published_is_made_before_and_checked_at_the_end():
     publishing = commands.index("organbench publish")
     makers = [commands.index(extra.command) for extra in EXTRAS.values()]
     makers += [number for number, step in enumerate(steps()) if step.study]
-    assert max(makers) < publishing < commands.index("organbench publish population peers") < len(commands) - 1
+    assert max(makers) < publishing < commands.index("organbench publish population") < len(commands) - 1
     assert commands[-1] == "organbench publish --check"
     sweep = commands.index("python -m studies.exchange.peers.main --sweep")
     assert sweep < commands.index("make study-league")

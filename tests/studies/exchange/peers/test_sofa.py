@@ -161,7 +161,7 @@ def test_what_it_hands_in_is_an_entry_of_the_league(scene_file, tmp_path):
 
 
 def test_a_scene_that_it_cannot_do_ends_with_a_sentence(scene_file, tmp_path):
-    sofa = scene_file(LIVER_PROBE)
+    sofa = scene_file(BALL_CLAMPED)
     described = json.loads((tmp_path / "scene.json").read_text())
     (tmp_path / "scene.json").write_text(json.dumps(described | {"lumen": {}}))
     with pytest.raises(SystemExit, match="it knows solid organs, not a wall round a lumen"):
