@@ -10,6 +10,8 @@ import typer
 from rich.console import Console, ConsoleOptions, RenderableType
 from rich.segment import Segment
 
+from studies.base.errors import StudyError
+
 STEERING = {"Cc", "Cf", "Cs"}
 """Categories of Unicode whose characters steer a terminal, or the direction of a text, and have no shape."""
 KEPT = "\n\t"
@@ -39,7 +41,17 @@ class VisibleConsole(Console):
 console = VisibleConsole(soft_wrap=True)
 errors = VisibleConsole(stderr=True, soft_wrap=True)
 
-Results = Annotated[Path, typer.Option("--results", envvar="ORGANBENCH_RESULTS", help="folder of the results")]
+
+def _results_folder(path: Path) -> Path:
+    if path.is_file():
+        raise StudyError(f"{path} is a file; give the folder of the results (--results)")
+    return path
+
+
+Results = Annotated[
+    Path,
+    typer.Option("--results", envvar="ORGANBENCH_RESULTS", callback=_results_folder, help="folder of the results"),
+]
 PROGRAM = "FILE.py is a program: run only files you trust"
 StudyName = Annotated[
     str,

@@ -48,9 +48,13 @@ class Outside(Method):
 def outside(name: str) -> Outside:
     """The method that stands for an entry. Raises StudyError for a name that is a method's, or that is no name."""
     if name in [method.name for method in (*METHODS, *LITERATURE)]:
-        raise StudyError(f"'{name}' is a method of this program; give your entry another name (--name)")
+        raise StudyError(
+            f"'{name}' is a method of this program; give your entry another name (--name, or engine in a JSON file)"
+        )
     if not name or readable(name) != name:
-        raise StudyError(f"{name!r} cannot name an entry; use letters, digits, '.', '_' and '-' (--name)")
+        raise StudyError(
+            f"{name!r} cannot name an entry; use letters, digits, '.', '_' and '-' (--name, or engine in a JSON file)"
+        )
     return dataclass(frozen=True)(type(name, (Outside,), {"name": name, "__module__": __name__}))()
 
 

@@ -30,25 +30,37 @@ def export(scene: Scene, folder: Path, nodes: int, rows: Sequence[Sequence[str]]
     """Writes the scene into `folder` with `nodes` vertices on its outer surface; the files, and why there is no curved
     mesh (nothing where there is one). rows: a body of ours, its error of force and of displacement [%], each as text.
 
-    Of a scene with a cut the meshes are cut already. Raises StudyError for a folder that is a file, a mesh that cannot
-    be made, and a cut whose time matters.
+    Of a scene with a cut the meshes are cut already. An earlier export in the folder is replaced, but for a solve.py
+    that was edited. Raises StudyError for a folder that is a file or holds something else, a mesh that cannot be made,
+    and a cut whose time matters.
     """
     scene = given_scene(scene)
-    if folder.exists() and not folder.is_dir():
-        raise StudyError(f"{folder} is a file; give the name of a folder")
+    check_folder(folder)
     meshes, why_not = given_meshes(scene, nodes)
+    found = rounded(description(scene, meshes, why_not))
+    texts = {DESCRIPTION: json.dumps(found, indent=1) + "\n", README: readme(found, nodes, rows), NAME: SOLVER}
+    texts[SOFA.name] = SOFA.read_text(encoding="utf-8")
+    if (folder / NAME).is_file() and (folder / NAME).read_text(encoding="utf-8", errors="replace") != SOLVER:
+        del texts[NAME]
     written = [_write_mesh(mesh, folder) for mesh in meshes]
     written.append(_write_surface(meshes, folder / FILES["surface"]))
     written += [_write_cut(mesh, folder / CUT_FILES[mesh.kind]) for mesh in meshes if scene.cut is not None]
     written.append(folder / FILES["paths"])
     write_whole(written[-1], paths_table(scene).to_csv(index=False, float_format=f"%.{DIGITS}g").encode())
-    found = rounded(description(scene, meshes, why_not))
-    texts = {DESCRIPTION: json.dumps(found, indent=1) + "\n", README: readme(found, nodes, rows), NAME: SOLVER}
-    texts[SOFA.name] = SOFA.read_text(encoding="utf-8")
     for name, text in texts.items():
         written.append(folder / name)
         write_whole(written[-1], text.encode())
+    for name in {*FILES.values(), *CUT_FILES.values()} - {path.name for path in written}:
+        (folder / name).unlink(missing_ok=True)  # of an earlier export
     return written, why_not
+
+
+def check_folder(folder: Path) -> None:
+    """Raises StudyError for a folder that is a file, and for one with other files than those of an export."""
+    if folder.exists() and not folder.is_dir():
+        raise StudyError(f"{folder} is a file; give the name of a folder")
+    if folder.is_dir() and any(folder.iterdir()) and not (folder / DESCRIPTION).is_file():
+        raise StudyError(f"{folder} holds other files; give a new folder, or one with an exported scene")
 
 
 def rounded(value: Any) -> Any:

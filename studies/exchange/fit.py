@@ -15,6 +15,8 @@ from studies.scene.scene import Scene
 
 SAME = 1e-6
 """Of the body: rest positions that differ by less are the same, though stored as 32-bit floats."""
+FAR = 20.0
+"""Sizes of the body that no node of a scene moves: steps beyond are in another unit, or the body has burst."""
 SAME_TIME = 1e-6
 """Of the scene's duration."""
 
@@ -41,6 +43,7 @@ def fitted(handed: Handed, scene: Scene, meshes: Sequence[GivenMesh]) -> Fitting
     _check_finite(name, "positions", t, x)
     mesh = _mesh_of(name, x.shape[1], meshes)
     _check_rest(name, x[0], mesh)
+    _check_near(name, t, x)
     for key, values in handed.histories.items():
         if values.shape != t.shape:
             raise StudyError(f"{name}: {key} has shape {values.shape} for {len(t)} steps; give one number for each")
@@ -67,6 +70,8 @@ def _times(handed: Handed, scene: Scene) -> np.ndarray:
     """The times of all steps, the first 0 (F + 1,)."""
     name, steps, wanted = handed.name, len(handed.positions), np.array([0.0, *scene.checkpoints])
     t = wanted if handed.t is None else np.asarray(handed.t)
+    if not steps:
+        raise StudyError(f"{name} holds no steps; hand in rest and {len(wanted) - 1} checkpoints")
     if t.shape != (steps,):
         what = "files" if handed.t is None else "steps"
         raise StudyError(f"{name}: {steps} {what} for {t.size} times; hand in rest and {len(wanted) - 1} checkpoints")
@@ -143,6 +148,18 @@ def _check_rest(name: str, rest: np.ndarray, mesh: GivenMesh) -> None:
         f"{name}: the positions at t = 0 are up to {gap:.3g} m from those of {file}; they belong to another rest mesh, "
         "or are not at rest"
     )
+
+
+def _check_near(name: str, t: np.ndarray, x: np.ndarray) -> None:
+    """Raises StudyError for the first step in which a node is FAR from its place at rest."""
+    size = float(np.linalg.norm(np.ptp(x[0], axis=0)))
+    moved = np.abs(x - x[0]).max(axis=(1, 2))
+    far = np.flatnonzero(moved > FAR * size)
+    if len(far):
+        raise StudyError(
+            f"{name}: a node at t = {t[far[0]]:g} s is {moved[far[0]]:.3g} m from its place at rest, "
+            f"{moved[far[0]] / size:.2g} times the size of the body; hand in all steps in metres"
+        )
 
 
 def _gap(one: np.ndarray, other: np.ndarray) -> float:

@@ -2,11 +2,12 @@
 
 import re
 import xml.etree.ElementTree as ElementTree
+import zlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
-from zipfile import is_zipfile
+from zipfile import BadZipFile, is_zipfile
 
 import h5py
 import numpy as np
@@ -50,7 +51,7 @@ def read_handed(path: Path) -> Handed:
         return READERS[path.suffix.lower()](path)
     except StudyError:
         raise
-    except (OSError, ValueError, KeyError, TypeError, RuntimeError, EOFError, ElementTree.ParseError) as error:
+    except UNREADABLE as error:
         reason = (str(error).splitlines() or [type(error).__name__])[0]
         raise StudyError(
             f"{path.name} cannot be read ({reason}); README.md of the scene describes what it must contain"
@@ -100,7 +101,11 @@ def _read_npz(path: Path) -> Handed:
                 f"{path.name} lacks {missing[0]!r}; it needs t (F) and positions (F, n, 3), and holds "
                 f"{', '.join(file.files) or 'nothing'}"
             )
-        found = {name: np.asarray(file[name], np.float64) for name in ("t", "positions", *OPTIONAL) if name in file}
+        stored = {name: file[name] for name in ("t", "positions", *OPTIONAL) if name in file}
+    odd = [name for name, values in stored.items() if np.iscomplexobj(values)]
+    if odd:
+        raise StudyError(f"{path.name}: {odd[0]} holds complex numbers; hand in real ones")
+    found = {name: np.asarray(values, np.float64) for name, values in stored.items()}
     return Handed(path.name, found.pop("t"), found.pop("positions"), found)
 
 
@@ -172,6 +177,18 @@ def _stacked(name: str, points: Sequence[np.ndarray], moved: Sequence[np.ndarray
     return np.stack([rows + row for rows, row in zip(points, fields, strict=True)])
 
 
+UNREADABLE = (
+    OSError,
+    ValueError,
+    KeyError,
+    TypeError,
+    RuntimeError,
+    EOFError,
+    ElementTree.ParseError,
+    BadZipFile,
+    zlib.error,
+)
+"""What readers raise for files that are damaged or hold something else."""
 READERS: dict[str, Callable[[Path], Handed]] = {
     ".npz": _read_npz,
     ".csv": _read_csv,

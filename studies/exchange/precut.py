@@ -18,7 +18,7 @@ def given_scene(scene: Scene) -> Scene:
     """The scene as another program gets it: of one with a cut, the checkpoints after it alone.
 
     Raises StudyError for a cut whose time matters: one in a scene without equilibria, one that lets a piece go, or one
-    that opens a lumen; and for several cuts.
+    that opens a lumen; for several cuts, and for one after which there is no checkpoint.
     """
     if len(scene.cuts) > 1:
         raise StudyError(
@@ -36,7 +36,12 @@ def given_scene(scene: Scene) -> Scene:
             f"scene '{scene.name}' cannot be given away cut from the start: cut '{cut.name}' opens a lumen, whose "
             "volume is kept until then"
         )
-    return replace(scene, checkpoints=tuple(t for t in scene.checkpoints if t > cut.ends))
+    after = tuple(t for t in scene.checkpoints if t > cut.ends)
+    if not after:
+        raise StudyError(
+            f"scene '{scene.name}' has no checkpoint after its cut '{cut.name}' at {cut.ends:g} s; add one"
+        )
+    return replace(scene, checkpoints=after)
 
 
 def reference_of(scene: Scene, reference: Reference | None) -> Reference | None:

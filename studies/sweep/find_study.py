@@ -1,5 +1,6 @@
 """A study by name: of the catalogue, or of a Python file of the user."""
 
+import math
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -18,6 +19,8 @@ ON = "@"
 """Between the name of a study and a folder of surfaces: "population@meshes", or "population@meshes:mm"."""
 NO_CASE = "the text is not a stored case: "
 """How `case_from_json` begins; of a case that was never stored these words say nothing."""
+FEWEST = 4
+"""Nodes of a body: those of a tetrahedron."""
 MAIN = "main"
 """Stands for the main studies of the catalogue; no study has this name."""
 
@@ -33,8 +36,14 @@ def find_study(name: str) -> Study:
     if not name.endswith(SUFFIX):
         return known_studies([name])[0]
     study = replace(read_user_file(name).as_study, word=name)
+    file = Path(name).name
+    if not study.cases:
+        raise StudyError(f"{file}: the study '{study.name}' has no cases; give at least one")
     for scene in study.scenes:
-        check_clock(scene, f"{Path(name).name}: ")
+        check_clock(scene, f"{file}: ")
+        for cut in scene.cuts if isinstance(scene.cuts, tuple) else ():
+            if not cut.name or not cut.name.isprintable():
+                raise StudyError(f"{file}: scene '{scene.name}' has a cut with the name {cut.name!r}; give it one")
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", "Pydantic serializer warnings")  # the sentence for an odd setting is ours
         for case in study.cases:
@@ -76,6 +85,7 @@ def find_studies(names: Sequence[str]) -> list[Study]:
 def _check_stored(name: str, case: Case) -> None:
     """Raises StudyError for a case that would not come back from its record as it is, with the first odd setting."""
     which = f"{Path(name).name}: scene '{case.scene.name}', case {case.name}"
+    _check_body(which, case)
     try:
         back = case_from_json(case.key)
         odd = _difference(case_to_dict(case.replaced(timed=False)), case_to_dict(back))
@@ -84,19 +94,36 @@ def _check_stored(name: str, case: Case) -> None:
     except Exception as error:  # a setting of a user may be anything
         raise StudyError(f"{which}: a setting is neither a number, a text nor a tuple of these ({error})") from error
     if odd is not None or back != case.replaced(timed=False):
-        raise StudyError(f"{which}: {odd or 'a setting'} cannot be stored and read back; use the project's own types")
+        odd = odd or "a setting cannot be stored and read back; use the project's own types"
+        raise StudyError(f"{which}: {odd}")
     if not case.name.isprintable():
         raise StudyError(f"{name}: case {case.name!r} has a name with characters that cannot be printed; rename it")
 
 
+def _check_body(which: str, case: Case) -> None:
+    """Raises StudyError for settings of a body or a cut of which storing says nothing, or nothing clear."""
+    if not isinstance(case.scene.cuts, tuple):
+        raise StudyError(f"{which}: scene.cuts is no tuple; write (Cut(...),)")
+    nodes, graded = case.body.nodes, case.body.graded
+    if type(nodes) is int and nodes < FEWEST:
+        raise StudyError(f"{which}: body.nodes is {nodes}; give a whole number from {FEWEST} on")
+    if isinstance(graded, str) and graded != "adaptive":
+        raise StudyError(f"{which}: body.graded is {graded!r}; give False, True or 'adaptive'")
+    if case.body.cut != "conforming" and not case.scene.cuts:
+        raise StudyError(f"{which}: body.cut is {case.body.cut!r}, and the scene has no cut; leave it out")
+
+
 def _difference(given: Any, back: Any, where: str = "") -> str | None:
-    """The first setting that is another after it was stored, as text "body.nodes = '100'"; None when none is."""
+    """What is wrong with the first setting that is another after it was stored; None when none is."""
+    if isinstance(given, float) and not math.isfinite(given) and given != back:
+        return f"{where} is {given}; give a finite number"
     if isinstance(given, dict) and isinstance(back, dict):
         pairs = [(f"{where}.{key}" if where else key, value, back.get(key)) for key, value in given.items()]
     elif isinstance(given, list | tuple) and isinstance(back, list | tuple) and len(given) == len(back):
         pairs = [(f"{where}[{k}]", a, b) for k, (a, b) in enumerate(zip(given, back, strict=True))]
     else:
         if type(given) is int and type(back) is float:
-            return f"{where} = {given!r} (write {float(given)})"
-        return None if type(given) is type(back) and given == back else f"{where} = {given!r}"
+            return f"{where} is the whole number {given}; write {float(given)}"
+        same = type(given) is type(back) and given == back
+        return None if same else f"{where} = {given!r} cannot be stored and read back; use the project's own types"
     return next((odd for odd in (_difference(a, b, path) for path, a, b in pairs) if odd), None)

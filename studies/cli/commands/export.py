@@ -9,6 +9,7 @@ from studies.base.errors import StudyError
 from studies.cli.terminal import Results, SceneName, busy, say, warn
 from studies.exchange.export import export as exported
 from studies.exchange.meshes import NODES
+from studies.exchange.starter import NAME
 from studies.sweep.find_scene import find_scene
 from studies.tools.advise.yardsticks import yardsticks
 
@@ -38,3 +39,5 @@ def export(
         warn([f"there is no curved mesh: {why_not}"])
     for path in written:
         say(path)
+    if folder / NAME not in written:
+        say(f"{folder / NAME} was edited and stays as it is")

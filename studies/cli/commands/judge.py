@@ -56,13 +56,14 @@ def judge(
             record = judged_file(found, entry, file.parent)
         run = run_of_entry(record, reference_of(results, found))
     path = entry_path(results if entry is None else results / FOLDER, run.case)
+    replaced = path.is_file()
     write_record(path, record)
     mesh = "the curved mesh" if run.case.body.kind == "quadratic" else "the straight mesh"
     steps = record.attributes["frames"]
     say(f"{run.case.method.name}: {record.status}, {record.attributes['nodes']} nodes of {mesh}, {steps} steps")
     for line in lines_of(run):
         say(line)
-    warn(hints_of(run))
+    warn([*hints_of(run), *([f"it replaces an entry named {run.case.method.name} on the same mesh"] * replaced)])
     beside = [study.name for study in STUDIES if found.name in [each.name for each in study.scenes]]
     command = "report" if entry is not None else f"table {beside[-1]}" if beside else ""
     shown = f", shown next to our methods by `organbench {command}`" if command else ""

@@ -2,9 +2,12 @@
 
 from pathlib import Path
 
+from studies.base.errors import StudyError
 from studies.cli.terminal import Results, StudyName, say, warn
+from studies.exchange.entry import entry_files
 from studies.metrics.table import check_columns
 from studies.report.results import refresh
+from studies.runs.current import case_path
 from studies.store.ledger import Ledger
 from studies.sweep.find_study import find_study
 
@@ -13,6 +16,9 @@ def plot(study: StudyName, results: Results = Path("results")) -> None:
     """Draw the charts and the table of a study. Nothing runs; the files are named."""
     found = find_study(study)
     check_columns(found.columns)
+    own = any(case_path(results, found.name, case).is_file() for case in found.cases)
+    if not own and not entry_files(results):
+        raise StudyError(f"nothing of {study} is stored in {results}; run `organbench run {study}` first")
     paths, remarks = refresh(Ledger(results), found)
     warn(remarks)
     for path in paths:

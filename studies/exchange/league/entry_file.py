@@ -62,7 +62,9 @@ def read_entry_file(path: Path) -> EntryFile:
         data = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
         raise StudyError(f"{path.name} cannot be read as an entry ({error})") from error
-    metrics = sorted(HANDED & set(data)) if isinstance(data, dict) else []
+    if not isinstance(data, dict):
+        raise StudyError(f"{path.name} holds no JSON object; docs/league.md lists what an entry needs")
+    metrics = sorted(HANDED & set(data))
     if metrics:
         raise StudyError(f"{path.name} hands in {', '.join(metrics)}: metrics are computed here; leave them out")
     try:
@@ -86,7 +88,12 @@ def check_entry(entry: EntryFile, scene: str) -> FrozenScene:
     if found.held_back:
         raise StudyError(f"{scene} of {SET} is held back: nobody can enter it before its data is published")
     key = mesh_key(entry.mesh, entry.nodes)
-    if found.meshes.get(key) != entry.mesh_sha256:
+    if key in found.meshes and found.meshes[key] != entry.mesh_sha256:
+        raise StudyError(
+            f"mesh_sha256 of the entry is not that of {key} of {scene} in {SET}; compute on the exported mesh "
+            "and copy its SHA-256 from scene.json"
+        )
+    if key not in found.meshes:
         known = ", ".join(found.meshes)
         raise StudyError(f"the mesh of the entry ({key}) is not one of {SET}, which has {known} of {scene}")
     return found
@@ -103,8 +110,8 @@ def check_mesh_here(entry: EntryFile, scene: Scene) -> None:
 
 def judged_file(scene: Scene, entry: EntryFile, folder: Path) -> Record:
     """The record of an entry whose result lies in `folder`. Raises StudyError for whatever does not fit the scene."""
-    if Path(entry.result).name != entry.result:
-        raise StudyError(f"the result {entry.result} of the entry must lie next to its JSON file; give its file name")
+    if not entry.result or Path(entry.result).name != entry.result:
+        raise StudyError(f"the result {entry.result!r} of the entry must lie next to its JSON file; give its file name")
     record = entry_record(scene, folder / entry.result, entry.engine, entry.nodes, seconds=entry.seconds)
     return replace(record, attributes=record.attributes | {LEAGUE: entry.model_dump_json()})
 

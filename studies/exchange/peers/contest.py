@@ -54,8 +54,14 @@ class Peer:
 
 ADAPTERS = "studies.exchange.peers."
 PEERS: tuple[Peer, ...] = (
-    Peer("mujoco", ADAPTERS + "mujoco_flex", packages=("mujoco-core==4.0.1",), settings={"poisson": 0.3}),
-    Peer("felupe", ADAPTERS + "felupe_quadratic", "curved", packages=("felupe==11.3.0", "pypardiso")),
+    Peer("mujoco", ADAPTERS + "mujoco_flex", packages=("mujoco-core==4.0.1",), settings={"poisson": 0.45}),
+    Peer(
+        "felupe",
+        ADAPTERS + "felupe_quadratic",
+        "curved",
+        packages=("felupe==11.3.0", "pypardiso"),
+        settings={"increments": 2},
+    ),
     Peer(
         "newton",
         ADAPTERS + "newton_vbd",
@@ -63,8 +69,8 @@ PEERS: tuple[Peer, ...] = (
         settings={"lame": 1.5},
     ),
     Peer("bullet", ADAPTERS + "bullet", packages=("pybullet==3.2.7",), settings={"lame": 1.5}),
-    Peer("drake", ADAPTERS + "drake_deformable", packages=("drake==1.51.1",), settings={"poisson": 0.3}),
-    Peer("sfepy", ADAPTERS + "sfepy_mixed", packages=("sfepy==2026.3",)),
+    Peer("drake", ADAPTERS + "drake_deformable", packages=("drake==1.51.1",), settings={"poisson": 0.4}),
+    Peer("sfepy", ADAPTERS + "sfepy_mixed", packages=("sfepy==2026.3",), settings={"increments": 1}),
     Peer("sofa", absent="no wheel on PyPI; it comes as binaries of its own or by conda"),
     Peer(
         "genesis",

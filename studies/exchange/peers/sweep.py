@@ -29,8 +29,8 @@ SHARE = "share of the target [1]"
 COST = "cost [s/s]"
 VOLUME, LOST = metric("volume_worst"), 1.0
 """Error of the volume [%] that is usually enough."""
-AS_GOOD = 1.05
-"""Of settings whose errors are within this factor of the smallest, the cheapest are the best."""
+AS_GOOD, AS_CHEAP = 1.05, 1.25
+"""Factors on the smallest error and on the cost within which two settings are alike; measured costs vary by as much."""
 DIALS: dict[str, dict[str, tuple[float, ...]]] = {
     "mujoco": {"poisson": (0.45, 0.4, 0.3), "step": (1e-3,), "stiff": (4.0,)},
     "felupe": {"increments": (2, 8), "penalty": (10.0,)},
@@ -87,8 +87,8 @@ def _numbers(record: Record, scene: Scene) -> dict[str, Any]:
 
 
 def best(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any] | None:
-    """The cheapest settings of a program among those whose worst share of the target is AS_GOOD as the smallest; None
-    where none ended well on every scene."""
+    """The settings of a program with the smallest worst share of the target; of those that are AS_GOOD the cheapest,
+    and of those that are AS_CHEAP the first. None where none ended well on every scene."""
     found: dict[str, list[Mapping[str, Any]]] = {}
     for row in rows:
         found.setdefault(row["settings"], []).append(row)
@@ -100,4 +100,6 @@ def best(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any] | None:
     if not ended:
         return None
     smallest = min(share for share, _, _ in ended)
-    return json.loads(min((cost, settings) for share, cost, settings in ended if share <= AS_GOOD * smallest)[1])
+    good = [(cost, settings) for share, cost, settings in ended if share <= AS_GOOD * smallest]
+    cheapest = min(cost for cost, _ in good)
+    return json.loads(next(settings for cost, settings in good if cost <= AS_CHEAP * cheapest))

@@ -15,7 +15,7 @@ import pytest
 from studies.runs.current import case_path
 from studies.store.paths import record_files
 from studies.store.record import Status, read_record, write_record
-from tests.studies.tiny import TINY, content, cube, tiny_case, write_obj
+from tests.studies.tiny import content, cube, tiny_case, write_obj
 
 REPOSITORY = Path(__file__).parents[3]
 
@@ -51,6 +51,18 @@ def test_unknown_words_get_the_nearest_match(refused, tmp_path, monkeypatch, wor
     monkeypatch.setenv("ORGANBENCH_RESULTS", str(tmp_path))
     assert told in refused(*words)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_file_in_the_place_of_the_results_folder(refused, tmp_path):
+    (tmp_path / "afile").write_text("")
+    for words in (("status",), ("table", "volume_loss"), ("plot", "volume_loss"), ("advise", "ball_squeeze")):
+        assert "is a file" in refused(*words, "--results", tmp_path / "afile")
+
+
+def test_a_study_of_which_nothing_is_stored_is_not_drawn(refused, tmp_path):
+    told = refused("plot", "volume_loss", "--results", tmp_path / "none")
+    assert "nothing of volume_loss is stored" in told and "run `organbench run volume_loss` first" in told
+    assert not (tmp_path / "none").exists()
 
 
 def test_a_terminal_without_the_letters_shows_question_marks(organbench, monkeypatch):
@@ -95,15 +107,13 @@ def test_a_key_that_is_no_case_cannot_be_replayed(refused, results):
     assert "not a stored case" in refused("replay", path)
 
 
-@pytest.mark.parametrize("command", [("run",), ("plot",), ("table", "--csv", "TARGET")])
+@pytest.mark.parametrize("command", [("run",), ("table", "--csv", "TARGET")])
 def test_results_that_cannot_be_written(refused, tiny_file, finished_sweep, tmp_path, command):
     """A folder below a file cannot be written, not even by the superuser."""
     (tmp_path / "file").write_text("no folder")
-    root = finished_sweep if command[0] == "table" else tmp_path / "file"
+    root = finished_sweep if command[0] == "table" else tmp_path / "file" / "below"
     target = [str(tmp_path / "file" / "t.csv") if word == "TARGET" else word for word in command[1:]]
     before = content(finished_sweep / "tiny")
-    if command[0] == "plot":
-        tiny_file.write_text(TINY.replace("charts=", "cases=(), charts="))
     sentence = refused(command[0], tiny_file, *target, "--results", root)
     assert "can be written to" in sentence
     assert content(finished_sweep / "tiny") == before

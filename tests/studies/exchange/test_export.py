@@ -14,7 +14,7 @@ import pytest
 
 from massspring import Capsule, Probe
 from studies.exchange.description import description, judged_metrics
-from studies.exchange.export import DIGITS, paths_table, rounded
+from studies.exchange.export import DIGITS, export, paths_table, rounded
 from studies.exchange.words import obstacle_words
 from studies.runs.recipe_text import body_words
 from studies.scene.library import CUT, SCENES
@@ -178,3 +178,19 @@ def test_what_cannot_be_exported_is_refused(refused, tmp_path):
     (tmp_path / "empty.py").write_text("")
     assert "defines neither STUDY nor SCENE" in refused("export", tmp_path / "empty.py")
     assert "nodes" in refused("export", "ball_squeeze", "-o", tmp_path / "few", "--nodes", 3)
+    (tmp_path / "full").mkdir()
+    (tmp_path / "full" / "README.md").write_text("mine")
+    assert "holds other files; give a new folder" in refused("export", "ball_squeeze", "-o", tmp_path / "full")
+    assert (tmp_path / "full" / "README.md").read_text() == "mine"
+
+
+def test_an_export_replaces_an_earlier_one_but_no_program_that_was_edited(tmp_path, mesh_cache):
+    export(BALL_SQUEEZE, tmp_path, NODES)
+    (tmp_path / "solve.py").write_text("mine")
+    for name in ("cut_straight.csv", "result.npz"):
+        (tmp_path / name).write_text("")
+    (tmp_path / "README.md").write_text("old")
+    written, _ = export(BALL_SQUEEZE, tmp_path, NODES)
+    assert (tmp_path / "solve.py").read_text() == "mine" and tmp_path / "solve.py" not in written
+    assert (tmp_path / "README.md").read_text() != "old" and (tmp_path / "result.npz").exists()
+    assert not (tmp_path / "cut_straight.csv").exists()

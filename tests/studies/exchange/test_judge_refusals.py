@@ -14,6 +14,10 @@ def wrong(ours, which):
         x[:, [3, 9]] = x[:, [9, 3]]
     elif which == "both":
         x = 1e3 * x[:, ::-1]
+    elif which == "steps in mm":
+        x[1:] *= 1e3
+    elif which == "burst":
+        x[9, 5, 1] = 1e300
     return {
         "mm": 1e3 * x,
         "inch": x / 0.0254,
@@ -21,6 +25,7 @@ def wrong(ours, which):
         "few": x[:, :-1],
         "displacements": x - x[0],
         "flat": x[..., :2],
+        "complex": x + 0.0j,
     }.get(which, x)
 
 
@@ -33,6 +38,9 @@ POSITIONS = {
     "displacements": "are all zero, so these are displacements; add the rest positions of straight.vtu",
     "few": "positions of 187 nodes, but straight.vtu 188 and curved.vtu 1112 at this number of vertices",
     "nan": "positions of node 5 at t = 0.7 s is not a finite number",
+    "steps in mm": "times the size of the body; hand in all steps in metres",
+    "burst": "a node at t = 0.9 s is 1e+300 m from its place at rest",
+    "complex": "positions holds complex numbers",
     "flat": "positions have shape (41, 188, 2); they must be (steps, nodes, 3)",
 }
 
@@ -57,6 +65,7 @@ HISTORIES = {
     ),
     "short force": (lambda o: {"force": o.force[:-1]}, "force has shape (40,) for 41 steps"),
     "force nan": (lambda o: {"force": np.where(o.t == 2.0, np.nan, o.force)}, "force at t = 2 s is not a finite"),
+    "no steps": (lambda o: {"t": o.t[:0], "positions": o.positions[:0]}, "a.npz holds no steps; hand in rest and"),
     "other times": (lambda o: {"t": o.t[:5]}, "41 steps for 5 times"),
 }
 
@@ -90,6 +99,14 @@ def test_a_file_that_is_none_is_refused(refused, scene_file, tmp_path, name):
     (tmp_path / name).write_text(content)
     assert told in refused("judge", scene_file, tmp_path / name, "--nodes", NODES)
     assert "there is no file" in refused("judge", scene_file, tmp_path / "none.npz")
+
+
+def test_a_file_with_a_flipped_byte_is_refused(refused, ours, scene_file, tmp_path):
+    path = ours.npz(tmp_path / "a.npz")
+    data = bytearray(path.read_bytes())
+    data[len(data) // 2] ^= 0xFF
+    path.write_bytes(data)
+    assert "a.npz cannot be read" in refused("judge", scene_file, path, "--nodes", NODES)
 
 
 def test_names_and_times_that_are_none_are_refused(refused, ours, scene_file, tmp_path):

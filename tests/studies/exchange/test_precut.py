@@ -210,6 +210,13 @@ def test_a_cut_whose_time_matters_is_not_given_away(tmp_path):
     assert not (tmp_path / "shell").exists()
 
 
+def test_a_cut_after_the_last_checkpoint_is_not_given_away(tmp_path):
+    late = replace(BALL_INCISED, reference=None, cuts=(replace(BALL_INCISED.cut, at=9.0),))
+    with pytest.raises(StudyError, match="has no checkpoint after its cut 'incision' at 9 s; add one"):
+        export(late, tmp_path / "late", NODES)
+    assert not (tmp_path / "late").exists()
+
+
 def test_what_comes_while_a_cut_advances_is_left_out():
     """Without a reference nothing refuses a checkpoint between its begin and its end."""
     between = replace(LIVER_CUT_LIVE, reference=None, checkpoints=(1.5, 2.5, 4.0))

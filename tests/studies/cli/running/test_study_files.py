@@ -42,6 +42,7 @@ BROKEN = {
 
 
 OWN = "from studies.catalog import Chart\nfrom massspring import Free\nfrom tests.studies.tiny import *\n"
+CUTTING = OWN + "from studies.scene.library import BALL_INCISED\nunnamed = replace(BALL_INCISED.cut, name='')\n"
 
 
 BROKEN |= {
@@ -58,7 +59,7 @@ BROKEN |= {
     "no scene": (OWN + "STUDY = tiny_study(cases=(tiny_case(scene=None),))\n", "a case needs a Scene, not None"),
     "nan": (
         OWN + "STUDY = tiny_study(cases=(tiny_case(body=BodyRecipe(stiffness=float('nan'))),))\n",
-        "body.stiffness = nan cannot be stored and read back",
+        "body.stiffness is nan; give a finite number",
     ),
     "text for a number": (
         OWN + "STUDY = tiny_study(cases=(tiny_case(body=BodyRecipe(nodes='100')),))\n",
@@ -71,7 +72,7 @@ BROKEN |= {
     "whole weight": (
         OWN + "STUDY = tiny_study(cases=(tiny_case(body=BodyRecipe('surface', weights=(1, 0.5, 1.0, 1.0))),))\n",
         "mine.py: scene 'tiny_squeeze', case tiny_squeeze-surface-550-implicit_volume-dt0.5-w1_0.5_1_1: "
-        "body.weights[0] = 1 (write 1.0) cannot be stored",
+        "body.weights[0] is the whole number 1; write 1.0",
     ),
     "frames of a scene": (
         OWN + "STUDY = tiny_study(cases=(tiny_case(scene=replace(SQUEEZE, frames=None)),))\n",
@@ -96,6 +97,27 @@ BROKEN |= {
         OWN + "STUDY = tiny_study(cases=(tiny_case(scene=replace(SQUEEZE, name='a\\0b')),))\n",
         "has a name with characters that cannot be printed",
     ),
+    "no nodes": (
+        OWN + "STUDY = tiny_study(cases=(tiny_case(body=BodyRecipe(nodes=-5)),))\n",
+        "body.nodes is -5; give a",
+    ),
+    "graded how": (
+        OWN + "STUDY = tiny_study(cases=(tiny_case(body=BodyRecipe('quadratic', 60, graded='adaptiv')),))\n",
+        "body.graded is 'adaptiv'; give False, True or 'adaptive'",
+    ),
+    "virtual nodes and no cut": (
+        OWN + "STUDY = tiny_study(cases=(tiny_case(body=BodyRecipe(nodes=60, cut='virtual')),))\n",
+        "body.cut is 'virtual', and the scene has no cut; leave it out",
+    ),
+    "a list of cuts": (
+        OWN + "STUDY = tiny_study(cases=(tiny_case(scene=replace(SQUEEZE, cuts=[])),))\n",
+        "scene.cuts is no tuple; write (Cut(...),)",
+    ),
+    "a cut without a name": (
+        CUTTING + "STUDY = tiny_study(cases=(tiny_case(scene=replace(BALL_INCISED, cuts=(unnamed,))),))\n",
+        "scene 'ball_incised' has a cut with the name ''; give it one",
+    ),
+    "no cases": (OWN + "STUDY = tiny_study(cases=())\n", "mine.py: the study 'tiny' has no cases; give at least one"),
     "recorded": (OWN + "STUDY = tiny_study(cases=(tiny_case(recorded='kinetic'),))\n", "recorded is 'kinetic'; give"),
 }
 

@@ -66,16 +66,27 @@ def test_an_entry_is_judged_and_becomes_a_row(organbench, entry, tmp_path):
     assert row["reference"].startswith("2027.1 ")
 
 
+def test_an_entry_that_replaces_another_one_says_so(organbench, entry, tmp_path):
+    for version, told in (("1", False), ("2", True)):
+        code, _, err = organbench("judge", "ball_squeeze", entry(version=version), "--results", tmp_path / "results")
+        assert code == 0 and ("it replaces an entry named mine on the same mesh" in err) == told
+
+
 REFUSED = {
     "another set": ({"set": "OB-2026.1"}, f"the entry is of set OB-2026.1; this version judges {SET}"),
     "another scene": ({"scene": "liver_press"}, "the entry is of liver_press, not of ball_squeeze"),
-    "a foreign mesh": ({"mesh_sha256": 64 * "0"}, f"the mesh of the entry (straight-150) is not one of {SET}"),
+    "a foreign mesh": (
+        {"mesh_sha256": 64 * "0"},
+        f"mesh_sha256 of the entry is not that of straight-150 of ball_squeeze in {SET}; compute on the exported mesh",
+    ),
     "another size": ({"nodes": 151}, "the mesh of the entry (straight-151) is not one of"),
     "a metric": ({"force_end": -0.1}, "mine.json hands in force_end: metrics are computed here; leave them out"),
     "metrics": ({"metrics": {"force_end": 0}}, "mine.json hands in metrics: metrics are computed here"),
     "an unknown key": ({"colour": "red"}, "mine.json: colour: extra inputs are not permitted"),
     "a wrong type": ({"seconds": "fast"}, "mine.json: seconds: input should be a valid number"),
     "a result elsewhere": ({"result": "../mine.npz"}, "must lie next to its JSON file; give its file name"),
+    "an empty result": ({"result": ""}, "the result '' of the entry must lie next to its JSON file"),
+    "an odd name": ({"engine": "a/b"}, "'a/b' cannot name an entry; use letters, digits, '.', '_' and '-'"),
     "no result": ({"result": "yours.npz"}, "there is no file"),
 }
 
@@ -113,6 +124,8 @@ def test_options_that_the_file_answers_are_refused(refused, entry):
 def test_a_file_that_is_no_entry_is_refused(refused, tmp_path):
     (tmp_path / "a.json").write_text("[1")
     assert "a.json cannot be read as an entry" in refused("judge", "ball_squeeze", tmp_path / "a.json")
+    (tmp_path / "a.json").write_text("[]")
+    assert "a.json holds no JSON object" in refused("judge", "ball_squeeze", tmp_path / "a.json")
 
 
 def test_the_league_is_published_from_its_entries_alone(organbench, refused, entry, tmp_path, monkeypatch):

@@ -35,6 +35,7 @@ def test_of_settings_as_good_as_each_other_the_cheapest_is_taken():
     """Else twice the steps would be paid for the last thousandth."""
     rows = [row({}, 2.0, 1.0), row({"step": 0.5}, 1.95, 2.0)]
     assert best(rows) == {} and best([*rows, row({"step": 0.25}, 1.0, 4.0)]) == {"step": 0.25}
+    assert best([*rows, row({"damping": 1}, 2.0, 0.9)]) == {} != best([*rows, row({"damping": 1}, 2.0, 0.7)])
 
 
 def test_each_keyword_is_varied_from_the_best_so_far(monkeypatch):
