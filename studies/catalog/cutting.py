@@ -71,6 +71,8 @@ CUTTING = Study(
         "force_error",
         "force_end",
         "mean_error",
+        "shape_error",
+        "shape_volume",
         "overlap",
         "piece_worst",
         "piece_sum_worst",

@@ -201,7 +201,7 @@ def _notes(scenes: dict[str, list[Judged]]) -> list[str]:
     if named:
         told.append(f"Recommended, the cheapest that is accurate enough: {'; '.join(named)}.")
     if lacking:
-        told.append(f"No body is accurate enough for {', '.join(lacking)}.")
+        told.append(f"No body is accurate enough and keeps the shape of its organ in {', '.join(lacking)}.")
     return told
 
 

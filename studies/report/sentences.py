@@ -26,6 +26,7 @@ Row = dict[str, Any]
 """Name of a column -> its value."""
 FORCE, VOLUME, STEP, SPEED = "force_end [%]", "volume_worst [%]", "step_time [µs]", "real_time [s/s]"
 OPENING, MEAN, PIECE = "opening_error [%]", "mean_error [%]", "piece_worst [%]"
+DISTANCE = "shape_error [%]"
 OURS = "implicit_volume"
 LINEAR = ("bullet", "drake", "mujoco", "newton")
 """Engines of the league on linear tetrahedra."""
@@ -210,8 +211,18 @@ def _chosen(published: Path) -> tuple[dict[str, float], list[str]]:
         if choice is not None and choice.meets:
             speeds[scene.name] = 1.0 / choice.body.cost.value
         elif choice is not None:
-            missed.append(f"{scene.name} {_why_not(choice.body, choice.wish)}")
+            missed.append(f"{scene.name} {_why_not(choice.body, choice.wish)}{_adaptive(published, scene.name)}")
     return speeds, missed
+
+
+def _adaptive(published: Path, scene: str) -> str:
+    """How far off the adaptive bodies of a scene are that end well; nothing where there are none."""
+    rows = [row for row in table(published, ACCURACY.name) if row["scene"] == scene and row["body"].startswith("adapt")]
+    sound = [row for row in rows if row["status"] == Status.OK]
+    if not sound:
+        return ""
+    off, bar = column(sound, MEAN), max(column(sound, MEAN.replace(" [", " floor [")))
+    return f" ({len(sound)} of {len(rows)} adaptive bodies end well and are {_range(off, 1)} ± {bar:.1f} % off)"
 
 
 def _why_not(one: Judged, wish: Wish) -> str:
@@ -238,6 +249,13 @@ def cuts(published: Path) -> str:
     touching = {scene.name for scene in CUT if any(cut.contact for cut in scene.cuts)}
     gaping, closed = ([row for name, row in finest.items() if (name in touching) == way] for way in (False, True))
     off = {name: [abs(value) for value in column(gaping, name)] for name in (OPENING, FORCE)}
+    distant = {name: row[DISTANCE] for name, row in finest.items() if row[DISTANCE] > SHAPE}
+    shape = (
+        f" The bodies of {' and '.join(distant)} are up to {max(distant.values()):.1f} % of the size off the true "
+        f"surface (allowed: {SHAPE:g} %)."
+        if distant
+        else ""
+    )
     known = {name: max(column(finest.values(), name.replace(" [", " floor ["))) for name in (OPENING, FORCE)}
     return (
         f"**Organs can be cut.** On {len(gaping)} scenes the opening of adaptive bodies that run in real time is "
@@ -245,7 +263,7 @@ def cuts(published: Path) -> str:
         f"{known[OPENING]:.1f} and {known[FORCE]:.1f} %); where cuts are pressed shut, the sliding of "
         f"their faces is {_range(column(closed, OPENING), 1)} % off. Displacements are within "
         f"{max(column(finest.values(), MEAN)):.1f} %, volumes of pieces within {max(column(adaptive, PIECE)):.1g} % "
-        f"([cut an organ](docs/cutting.md), [pictures](results/published/cutting/cut_open.png))."
+        f"([cut an organ](docs/cutting.md)).{shape}"
     )
 
 

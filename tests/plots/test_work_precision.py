@@ -104,7 +104,9 @@ def test_the_paper_s_body_and_what_is_recommended_are_named():
 def test_where_nothing_is_accurate_enough_nothing_is_recommended():
     figure = work.figure(LADDER[:3])
     assert "recommended" not in words(figure.axes[0])
-    assert "No body is accurate enough for ball clamped." in words(figure).replace("\n", " ")
+    assert "No body is accurate enough and keeps the shape of its organ in ball clamped." in words(figure).replace(
+        "\n", " "
+    )
 
 
 def test_a_run_that_ended_with_a_fault_is_no_point():

@@ -55,13 +55,7 @@ class Peer:
 ADAPTERS = "studies.exchange.peers."
 PEERS: tuple[Peer, ...] = (
     Peer("mujoco", ADAPTERS + "mujoco_flex", packages=("mujoco-core==4.0.1",), settings={"poisson": 0.45}),
-    Peer(
-        "felupe",
-        ADAPTERS + "felupe_quadratic",
-        "curved",
-        packages=("felupe==11.3.0", "pypardiso"),
-        settings={"increments": 2},
-    ),
+    Peer("felupe", ADAPTERS + "felupe_quadratic", "curved", packages=("felupe==11.3.0", "pypardiso")),
     Peer(
         "newton",
         ADAPTERS + "newton_vbd",
@@ -70,7 +64,7 @@ PEERS: tuple[Peer, ...] = (
     ),
     Peer("bullet", ADAPTERS + "bullet", packages=("pybullet==3.2.7",), settings={"lame": 1.5}),
     Peer("drake", ADAPTERS + "drake_deformable", packages=("drake==1.51.1",), settings={"poisson": 0.4}),
-    Peer("sfepy", ADAPTERS + "sfepy_mixed", packages=("sfepy==2026.3",), settings={"increments": 1}),
+    Peer("sfepy", ADAPTERS + "sfepy_mixed", packages=("sfepy==2026.3",)),
     Peer("sofa", absent="no wheel on PyPI; it comes as binaries of its own or by conda"),
     Peer(
         "genesis",
