@@ -74,3 +74,21 @@ def test_programs_run_with_the_best_of_the_published_sweep(name):
     (peer,) = [peer for peer in PEERS if peer.name == name]
     assert {one["scene"] for one in rows} == {one.name for one in SWEPT}
     assert len(rows) >= 6 and best(rows) == dict(peer.settings)
+
+
+def test_half_the_step_changes_forces_by_what_the_page_says():
+    rows = pd.read_csv(TABLE)
+    changes = {}
+    for name, dials in DIALS.items():
+        forces = {
+            (row["settings"], row["scene"]): row["force_end [%]"] for _, row in rows[rows["engine"] == name].iterrows()
+        }
+        for settings, scene in forces:
+            chosen = json.loads(settings)
+            if "step" in dials and chosen.pop("step", None):
+                change = abs(forces[settings, scene] - forces[json.dumps(chosen), scene])
+                changes[name] = max(change, changes.get(name, 0.0))
+    page = " ".join((TABLE.parents[3] / "docs" / "league.md").read_text(encoding="utf-8").split())
+    drake = changes.pop("drake")
+    assert set(changes) == {"bullet", "mujoco", "newton"}
+    assert f"by at most {max(changes.values()):.1f} percentage points and those of Drake by {drake:.1f}." in page
