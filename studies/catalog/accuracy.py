@@ -143,5 +143,5 @@ ACCURACY = Study(
         "alternation",
         "sway",
     ),
-    expects=(Status.INVERTED, Status.DIVERGED),  # the hanging spleen: docs/accuracy.md
+    expects=(Status.INVERTED,),  # the hanging spleen: docs/accuracy.md
 )
