@@ -22,7 +22,7 @@ SCENES = (LIVER_PRESS, LIVER_PROBE, STOMACH_PRESS, STOMACH_PROBE)
 SIZE = 794
 MORE = 8.0
 """Damping [1/s] that the scenes had."""
-EQUILIBRIA = {"liver_press": (-1.7, -1.0, 1.2, 1.5, 1.8), "liver_probe": (4.5, -1.5, 5.2, 1.4, -1.4)}
+EQUILIBRIA = {"liver_press": (-2.7, -2.4, 0.4, 0.8, 1.2), "liver_probe": (4.8, -1.5, 5.0, 1.0, -2.1)}
 """Scene -> what the force is above the reference at each checkpoint when nothing drags [%]."""
 
 
