@@ -132,7 +132,7 @@ def incised_ball(mesh: JudgeMesh) -> OrganSolution:
 JUDGES = (
     Judge(BALL_SQUEEZE, squeezed, MeridianMesh(0.14, 0), MeridianMesh(0.1, 0)),
     Judge(BALL_CLAMPED, clamped, MeridianMesh(0.2, 4), MeridianMesh(0.1, 4)),
-    Judge(LIVER_PRESS, pressed_liver, JudgeMesh(300, 2), JudgeMesh(480, 3), "solid", "tetrahedra"),
+    Judge(LIVER_PRESS, pressed_liver, JudgeMesh(330, 2), JudgeMesh(550, 3), "solid", "tetrahedra"),
     Judge(BALL_INCISED, incised_ball, JudgeMesh(120, 1), JudgeMesh(200, 2), "solid", "tetrahedra"),
 )
 
