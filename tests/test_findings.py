@@ -160,6 +160,18 @@ def test_numbers_that_the_list_of_limits_quotes():
     assert sizes in " ".join((ROOT / "docs/findings.md").read_text(encoding="utf-8").split())
 
 
+def test_how_far_forces_are_from_those_of_the_second_judge():
+    rows = pd.read_csv(TABLES / "verify" / "verify.csv")
+    rows = rows[rows["oracle"].str.startswith("judge_") & (rows["quantity"] == "force_end")]
+    assert (rows["met"] == "yes").all() and len(rows) == 4
+    shown = [
+        f"{100 * off:.2f} % ({name.removeprefix('judge_')})"
+        for name, off in zip(rows["oracle"], rows["deviation"], strict=True)
+    ]
+    text = " ".join((ROOT / "docs/theory.md").read_text(encoding="utf-8").split())
+    assert f"Forces then differ by {', '.join(shown[:3])} and {shown[3]}." in text
+
+
 def test_numbers_that_the_page_on_cuts_quotes():
     """The table of adaptive bodies that gape, and that of faces that touch."""
     page = (ROOT / "docs/cutting.md").read_text(encoding="utf-8")
