@@ -110,7 +110,8 @@ def publish(root: Path, studies: Sequence[Study], home: Path) -> tuple[list[Path
     target = home / PUBLISHED
     copies = _copy(sources, root, target)
     kept = {*absent, *APART} - {study.name for study in studies}
-    _remove([file for file in _files(target) if not kept & _names(file, target)], copies)
+    old = [file for file in _files(target) if not kept & _names(file, target)]
+    _remove(old, [*copies, target / FILE])  # what is kept stays noted
     copies.append(note(target, {name: code() for name, code in _codes(studies, made).items()}))
     show_sentences({study.name for study in studies} | {*made}, home)
     return copies, absent

@@ -80,6 +80,7 @@ def test_what_nothing_makes_any_more_goes_and_what_was_not_made_again_stays(curr
     for name in ("volume_loss/older.png", "verify/verify.csv", "bench.csv", "population/population.csv"):
         (home / PUBLISHED / name).parent.mkdir(parents=True, exist_ok=True)
         (home / PUBLISHED / name).write_text("old")
+    (home / PUBLISHED / FILE).write_text('{"verify": "hash"}')
     (current / "bench.csv").write_text("new")
     set_stamp(current, "bench.csv")
     publish(current, [HEADLINE], home)
@@ -87,6 +88,8 @@ def test_what_nothing_makes_any_more_goes_and_what_was_not_made_again_stays(curr
     assert (home / PUBLISHED / "verify/verify.csv").read_text() == "old"
     assert (home / PUBLISHED / "population/population.csv").read_text() == "old"
     assert (home / PUBLISHED / "bench.csv").read_text() == "new"
+    known = noted(home / PUBLISHED)
+    assert known["verify"] == "hash" and "bench.csv" in known
 
 
 def miss(root, monkeypatch):
