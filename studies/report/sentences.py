@@ -217,7 +217,8 @@ def _chosen(published: Path) -> tuple[dict[str, float], list[str]]:
 
 def _adaptive(published: Path, scene: str) -> str:
     """How far off the adaptive bodies of a scene are that end well; nothing where there are none."""
-    rows = [row for row in table(published, ACCURACY.name) if row["scene"] == scene and row["body"].startswith("adapt")]
+    known = (row for row in table(published, ACCURACY.name) if row["scene"] == scene)
+    rows = [row for row in known if row["body"].startswith("adaptive")]
     sound = [row for row in rows if row["status"] == Status.OK]
     if not sound:
         return ""

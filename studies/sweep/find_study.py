@@ -41,9 +41,6 @@ def find_study(name: str) -> Study:
         raise StudyError(f"{file}: the study '{study.name}' has no cases; give at least one")
     for scene in study.scenes:
         check_clock(scene, f"{file}: ")
-        for cut in scene.cuts if isinstance(scene.cuts, tuple) else ():
-            if not cut.name or not cut.name.isprintable():
-                raise StudyError(f"{file}: scene '{scene.name}' has a cut with the name {cut.name!r}; give it one")
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", "Pydantic serializer warnings")  # the sentence for an odd setting is ours
         for case in study.cases:
@@ -85,7 +82,7 @@ def find_studies(names: Sequence[str]) -> list[Study]:
 def _check_stored(name: str, case: Case) -> None:
     """Raises StudyError for a case that would not come back from its record as it is, with the first odd setting."""
     which = f"{Path(name).name}: scene '{case.scene.name}', case {case.name}"
-    _check_body(which, case)
+    _check_settings(which, case)
     try:
         back = case_from_json(case.key)
         odd = _difference(case_to_dict(case.replaced(timed=False)), case_to_dict(back))
@@ -100,10 +97,13 @@ def _check_stored(name: str, case: Case) -> None:
         raise StudyError(f"{name}: case {case.name!r} has a name with characters that cannot be printed; rename it")
 
 
-def _check_body(which: str, case: Case) -> None:
+def _check_settings(which: str, case: Case) -> None:
     """Raises StudyError for settings of a body or a cut of which storing says nothing, or nothing clear."""
     if not isinstance(case.scene.cuts, tuple):
         raise StudyError(f"{which}: scene.cuts is no tuple; write (Cut(...),)")
+    for cut in case.scene.cuts:
+        if not cut.name or not cut.name.isprintable():
+            raise StudyError(f"{which}: a cut has the name {cut.name!r}; give it one")
     nodes, graded = case.body.nodes, case.body.graded
     if type(nodes) is int and nodes < FEWEST:
         raise StudyError(f"{which}: body.nodes is {nodes}; give a whole number from {FEWEST} on")

@@ -63,7 +63,9 @@ def judge(
     say(f"{run.case.method.name}: {record.status}, {record.attributes['nodes']} nodes of {mesh}, {steps} steps")
     for line in lines_of(run):
         say(line)
-    warn([*hints_of(run), *([f"it replaces an entry named {run.case.method.name} on the same mesh"] * replaced)])
+    warn(hints_of(run))
+    if replaced:
+        warn([f"it replaces an entry named {run.case.method.name} on the same mesh"])
     beside = [study.name for study in STUDIES if found.name in [each.name for each in study.scenes]]
     command = "report" if entry is not None else f"table {beside[-1]}" if beside else ""
     shown = f", shown next to our methods by `organbench {command}`" if command else ""

@@ -115,7 +115,7 @@ BROKEN |= {
     ),
     "a cut without a name": (
         CUTTING + "STUDY = tiny_study(cases=(tiny_case(scene=replace(BALL_INCISED, cuts=(unnamed,))),))\n",
-        "scene 'ball_incised' has a cut with the name ''; give it one",
+        "a cut has the name ''; give it one",
     ),
     "no cases": (OWN + "STUDY = tiny_study(cases=())\n", "mine.py: the study 'tiny' has no cases; give at least one"),
     "recorded": (OWN + "STUDY = tiny_study(cases=(tiny_case(recorded='kinetic'),))\n", "recorded is 'kinetic'; give"),
