@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from studies.reference.published import published, record_of
 from studies.reference.reference_solves import ReferenceSolve, reference_solves
 from studies.runs.case import BodyRecipe, Case
 from studies.runs.current import case_path
@@ -40,11 +41,11 @@ def rows_of(path):
 def test_unknowns_are_predicted_from_the_plan():
     """Of the finest mesh of an octant, within 5 %; of nested meshes no more than the plan allows."""
     octants = {scene.name: scene for scene in JUDGED if scene.symmetric}
-    ratios = {
-        row["scene"]: unknowns(ReferenceSolve(octants[row["scene"]])) / float(row["unknowns"])
-        for row in rows_of(PUBLISHED / "reference" / "uncertainty.csv")
-        if row["scene"] in octants
-    }
+    ratios = {}
+    for name, scene in octants.items():
+        entry = published(scene)
+        assert entry is not None, name
+        ratios[name] = unknowns(ReferenceSolve(scene)) / record_of(scene, entry).attributes["unknowns"]
     assert len(ratios) == 2 and all(0.95 < ratio < 1.05 for ratio in ratios.values()), ratios
     nested = [scene for scene in JUDGED if scene.reference.nested]
     assert len(nested) > 5
