@@ -49,6 +49,14 @@ def source_fingerprint(*modules: str, within: tuple[str, ...] = OWN) -> str:
     Read once per process: a running process computes with the code that it has loaded.
     Raises MassSpringError for a module that does not exist, or is no Python.
     """
+    digest = hashlib.sha256()
+    for name, meaning in sorted(source_hashes(*modules, within=within).items()):
+        digest.update(f"{name}\0{meaning}\0".encode())
+    return digest.hexdigest()
+
+
+def source_hashes(*modules: str, within: tuple[str, ...] = OWN) -> dict[str, str]:
+    """The hash of each module that `source_fingerprint` covers, by dotted name. Raises the same."""
     known: dict[str, Source] = {}
     waiting = list(modules)
     while waiting:
@@ -58,10 +66,7 @@ def source_fingerprint(*modules: str, within: tuple[str, ...] = OWN) -> str:
         known[name] = _source(name)
         waiting += [other for other in _followed(name) if _counts(other, within)]
     _remembered().keep()
-    digest = hashlib.sha256()
-    for name in sorted(known):
-        digest.update(f"{name}\0{known[name].meaning}\0".encode())
-    return digest.hexdigest()
+    return {name: source.meaning for name, source in known.items()}
 
 
 def own_file(module: str) -> Path | None:

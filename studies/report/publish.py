@@ -290,11 +290,16 @@ def check_studies(ledger: Ledger, studies: Sequence[Study], done: str = "publish
         )
 
 
+def is_current(root: Path, name: str) -> bool:
+    """Whether the present code made one of EXTRAS, other than the league, below `root`."""
+    return is_stamped(root, name, EXTRAS[name].makers)
+
+
 def check_extras(root: Path, names: Sequence[str]) -> None:
     """Raises StudyError when one of these EXTRAS was made by other code."""
     if LEAGUE in names:
         check_entries(root / LEAGUE, EXTRAS[LEAGUE].command)
-    stale = [name for name in names if name != LEAGUE and not is_stamped(root, name)]
+    stale = [name for name in names if name != LEAGUE and not is_current(root, name)]
     if stale:
         raise StudyError(
             f"not published: {root / stale[0]} was made by other code; run `{EXTRAS[stale[0]].command}` and publish "

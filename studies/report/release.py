@@ -16,11 +16,10 @@ import typer
 from reference_fem import crosscheck
 from studies.base.errors import StudyError
 from studies.catalog import STUDIES, Study
-from studies.report.publish import APART, EXTRAS, KEPT, LEAGUE, PUBLISHED, REFERENCES, SWEEP
+from studies.report.publish import APART, EXTRAS, KEPT, LEAGUE, PUBLISHED, REFERENCES, SWEEP, is_current
 from studies.report.published_code import FILE
 from studies.report.summary import SUMMARIES
 from studies.store.ledger import Ledger
-from studies.store.stamps import is_stamped
 from studies.sweep.find_study import find_study
 from studies.sweep.plan import expected, plan
 
@@ -85,7 +84,7 @@ def seconds_of(step: Step, ledger: Ledger) -> float:
     """How long a step takes from here on [s], about; 0 for one whose results are all current."""
     if step.study:
         return expected(plan(ledger, find_study(step.study)), JOBS)
-    if step.makes and all(name in EXTRAS and name != LEAGUE and is_stamped(ledger.root, name) for name in step.makes):
+    if step.makes and all(name in EXTRAS and name != LEAGUE and is_current(ledger.root, name) for name in step.makes):
         return 0.0
     return 60.0 * MINUTES.get(step.command, FEW_MINUTES)
 

@@ -1,25 +1,28 @@
-"""Marks on results that no record stands behind: whether the present code made them."""
+"""Marks on results that no record stands behind: by which code they were made."""
 
+import json
 from pathlib import Path
 
-from massspring.sources import own_modules, source_fingerprint
+from massspring.sources import own_modules, source_hashes
 from studies.base.atomic import write_whole
 
 
 def set_stamp(root: Path, name: str) -> None:
     """Notes that the present code has just written `root`/`name`. Raises StudyError when it cannot be noted."""
-    write_whole(_path(root, name), _code().encode())
+    write_whole(_path(root, name), json.dumps(source_hashes(*own_modules())).encode())
 
 
-def is_stamped(root: Path, name: str) -> bool:
-    """Whether `root`/`name` was written by the present code."""
+def is_stamped(root: Path, name: str, makers: tuple[str, ...]) -> bool:
+    """Whether the modules `makers`, and all that they import, are as they were when `root`/`name` was written."""
     path = _path(root, name)
-    return path.is_file() and path.read_text(encoding="utf-8") == _code()
+    if not path.is_file():
+        return False
+    try:
+        noted = json.loads(path.read_text(encoding="utf-8"))
+    except ValueError:
+        return False  # cut off, or of an earlier release
+    return isinstance(noted, dict) and noted.items() >= source_hashes(*makers).items()
 
 
 def _path(root: Path, name: str) -> Path:
     return root / "cache" / f"{name}.made"
-
-
-def _code() -> str:
-    return source_fingerprint(*own_modules())

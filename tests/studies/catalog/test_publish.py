@@ -19,6 +19,7 @@ from studies.report.sentences import Sentences
 from studies.report.summary import SUMMARIES
 from studies.runs import current as runs
 from studies.runs.current import case_path
+from studies.store import stamps
 from studies.store.machine import machine_id, machine_of
 from studies.store.stamps import is_stamped, set_stamp
 from tests.studies.tiny import tiny_case, tiny_study
@@ -161,12 +162,24 @@ def test_report_shows_a_study_of_a_file_beside_those_of_the_catalogue(results, o
     assert "tiny squeeze" in page and f"<code>organbench run {tiny_file.name}</code>" in page
 
 
-def test_a_stamp_holds_for_one_code(tmp_path, monkeypatch):
-    assert not is_stamped(tmp_path, "bench.csv")
+def test_a_stamp_holds_for_the_code_of_its_makers(tmp_path, monkeypatch):
+    bench, meshes = EXTRAS["bench.csv"].makers, EXTRAS["geometry.csv"].makers
+    assert not is_stamped(tmp_path, "bench.csv", bench)
     set_stamp(tmp_path, "bench.csv")
-    assert is_stamped(tmp_path, "bench.csv") and not is_stamped(tmp_path, "geometry.csv")
-    monkeypatch.setattr("studies.store.stamps.source_fingerprint", lambda *sources: "another code")
-    assert not is_stamped(tmp_path, "bench.csv")
+    assert is_stamped(tmp_path, "bench.csv", bench) and not is_stamped(tmp_path, "geometry.csv", meshes)
+    hashes = stamps.source_hashes
+
+    def edited(module):
+        return lambda *makers: {name: "edited" if name == module else text for name, text in hashes(*makers).items()}
+
+    monkeypatch.setattr(stamps, "source_hashes", edited("studies.report.sentences"))
+    assert is_stamped(tmp_path, "bench.csv", bench), "no benchmark writes sentences"
+    monkeypatch.setattr(stamps, "source_hashes", edited("massspring.methods.implicit_volume"))
+    assert not is_stamped(tmp_path, "bench.csv", bench)
+    monkeypatch.undo()
+    path = tmp_path / "cache" / "bench.csv.made"
+    path.write_text(path.read_text()[:-9])
+    assert not is_stamped(tmp_path, "bench.csv", bench), "a stamp that was cut off"
 
 
 def test_git_sees_what_is_published_and_nothing_else_below_results(tmp_path):
