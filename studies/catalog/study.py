@@ -104,7 +104,8 @@ class Study:
         for what, kind in (("cases", Case), ("charts", Chart), ("columns", str), ("expects", str)):
             given = getattr(self, what)
             if not isinstance(given, tuple | list):
-                raise StudyError(f"{what} is {given!r}; give a tuple, such as ({given!r},)")
+                words = repr(given) if kind is str else f"one {type(given).__name__}"  # a case takes many lines
+                raise StudyError(f"{what} is {words}; give a tuple of them")
             odd = [item for item in given if not isinstance(item, kind) and not (kind is str and _is_metric(item))]
             if odd:
                 raise StudyError(f"{what} holds {odd[0]!r}, which is not a {kind.__name__}")

@@ -9,6 +9,7 @@ from rich.table import Table
 
 from studies.catalog import STUDIES
 from studies.cli.terminal import SMOKE, Results, Smoke, busy, console, say
+from studies.metrics.table import check_columns
 from studies.scene.scene import Scene
 from studies.store.ledger import Ledger
 from studies.sweep.find_study import find_study
@@ -30,6 +31,8 @@ def status(
     chosen = [find_study(study)] if study else list(STUDIES)
     if smoke:
         chosen, results = [entry.smoke() for entry in chosen], results / SMOKE
+    for entry in chosen:
+        check_columns(entry.columns)
     ledger = Ledger(results, check)
     for entry in chosen:
         with busy(f"checking {entry.name}"):

@@ -127,7 +127,7 @@ def test_references_are_shared_and_come_first(tmp_path):
 def test_results_that_cannot_be_written_are_told_before_anything_runs(tmp_path, monkeypatch):
     (tmp_path / "file").write_text("no folder")
     monkeypatch.setattr(Local, "map", lambda *_: pytest.fail("nothing may run"))
-    with pytest.raises(StudyError, match="choose a results folder that can be written to"):
+    with pytest.raises(StudyError, match="choose a folder that can be written to"):
         run_studies(tmp_path / "file", [tiny_study()], 1, Silent())
 
 

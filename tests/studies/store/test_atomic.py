@@ -47,7 +47,7 @@ def test_a_truly_full_device(tmp_path, monkeypatch):
 
 def test_a_folder_that_cannot_be_written(tmp_path):
     (tmp_path / "results").write_text("a file where the folder should be")
-    with pytest.raises(StudyError, match="choose a results folder that can be written to"):
+    with pytest.raises(StudyError, match="choose a folder that can be written to"):
         write_whole(tmp_path / "results" / "study" / "a.h5", b"new")
 
 

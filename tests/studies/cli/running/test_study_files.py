@@ -87,6 +87,7 @@ BROKEN |= {
         "mine.py: scene 'tiny_squeeze': the duration is inf s; give a finite number above 0",
     ),
     "columns": (OWN + "STUDY = tiny_study(columns='volume_worst')\n", "columns is 'volume_worst'; give a tuple"),
+    "one case": (OWN + "STUDY = tiny_study(cases=tiny_case())\n", "cases is one Case; give a tuple of them"),
     "no case": (OWN + "STUDY = tiny_study(cases=(3,))\n", "cases holds 3, which is not a Case"),
     "reserved": (OWN + "STUDY = tiny_study(name='cache')\n", "a study cannot be called 'cache'"),
     "chart elsewhere": (
@@ -133,7 +134,7 @@ def test_a_study_file_that_is_wrong(refused, tmp_path, fault):
     text, told = BROKEN[fault]
     path = tmp_path / "mine.py"
     path.write_text(text)
-    for command in ("run", "table"):
+    for command in ("run", "table", "status"):
         assert told in refused(command, path, "--results", tmp_path / "results")
     assert not (tmp_path / "results").exists()
 
