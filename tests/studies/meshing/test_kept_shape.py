@@ -73,7 +73,7 @@ def test_the_held_area_is_warned_of_and_then_refused(monkeypatch, off, said):
 
 def test_few_facets_under_a_probe_are_told_before_the_run(monkeypatch):
     few = mesh_of(LIVER_PROBE, BodyRecipe("quadratic", 394))
-    many = mesh_of(LIVER_PROBE, BodyRecipe("quadratic", 594, graded="adaptive"))
+    many = mesh_of(LIVER_PROBE, BodyRecipe("quadratic", 594, graded=True))
     (sentence,) = [line for line in told(LIVER_PROBE, few) if "touch" in line]
     assert "below 20" in sentence and "graded='adaptive'" in sentence
     enough = touched_facets(LIVER_PROBE, many)

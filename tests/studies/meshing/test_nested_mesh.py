@@ -273,13 +273,10 @@ def test_the_faces_of_a_cut_stay_in_its_plane_where_the_surface_leans_over_it():
         assert area / 2 == pytest.approx(np.pi * (RADIUS**2 - height**2), rel=8e-3)
 
 
-HANGING = member("spleen", 0, 0), member("spleen", 0, 1)
-"""At 270 surface nodes both lose the end of the hilum; of the second the next finer mesh has an element that folds
-between the points where the reference integrates it."""
-
-
-@pytest.mark.parametrize("scene", HANGING, ids=lambda scene: scene.name)
-def test_the_coarsest_mesh_keeps_the_area_that_is_held_and_no_part_of_it_folds(scene):
+def test_the_coarsest_mesh_keeps_the_area_that_is_held_and_no_part_of_it_folds():
+    """At 270 surface nodes the end of the hilum is lost; the next finer mesh has an element that folds between the
+    points where the reference integrates it."""
+    scene = member("spleen", 0, 1)
     given = scene.reference.base
     plain = held_mesh(scene, mesh_for(scene, given, on_shape=True))
     corners = area_error(scene.organ, scene.held[0], plain.mesh.p.T, plain.patches[0])

@@ -170,7 +170,7 @@ def test_lengths_are_rounded_below_what_is_promised_and_all_else_is_kept(tmp_pat
     index.cache_clear()
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_the_cheapest_published_reference_is_solved_again_within_both_bars():
     """By the code as it is; `organbench verify --references` does all."""
     assert [check for check in solved_again(BALL_SQUEEZE) if not check.met] == []

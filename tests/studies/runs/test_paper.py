@@ -14,7 +14,7 @@ from studies.scene.as_json import scene_from_dict, scene_to_json
 from studies.scene.library import JUDGED, SCENES, STOMACH_SLIDE
 from studies.scene.library.stomach_slide import NODES
 
-SMALL = 400
+SMALL = 300
 
 
 @pytest.fixture(scope="module")
