@@ -116,6 +116,5 @@ def _sentence(path: Path, size: int | None, problem: OSError) -> str:
         return f"{path} was not written, a folder has its name: move or delete that folder, and run again"
     reason = problem.strerror or str(problem)
     return (
-        f"{path} was not written ({reason}): choose a folder that can be written to; "
-        "everything stored before is kept"
+        f"{path} was not written ({reason}): choose a folder that can be written to; everything stored before is kept"
     )
