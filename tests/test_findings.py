@@ -43,6 +43,11 @@ def changed(published: Path, study: str, change) -> str:
     return " ".join(HEADLINE.written(published).split())
 
 
+def page(name: str) -> str:
+    """Its text on one line."""
+    return " ".join((ROOT / name).read_text(encoding="utf-8").split())
+
+
 @pytest.mark.parametrize("sentences", SENTENCES, ids=lambda sentences: sentences.name)
 def test_findings_in_words_are_read_off_the_published_tables(sentences):
     assert between(sentences.page, sentences.marks) == sentences.written(TABLES), "run `organbench publish`"
@@ -121,7 +126,7 @@ def test_the_words_of_the_answers_hold():
 
 
 def test_the_ball_the_liver_and_the_step_of_the_first_table():
-    text = " ".join((ROOT / "docs/findings.md").read_text(encoding="utf-8").split())
+    text = page("docs/findings.md")
     radius, volume, modulus, nodes = re.findall(
         r"Ball of (\d+) cm radius and liver of ([\d.]+) L, shear modulus ([\d.]+) kPa, (\d+) surface nodes", text
     )[0]
@@ -136,7 +141,7 @@ def test_the_ball_the_liver_and_the_step_of_the_first_table():
 
 
 def test_numbers_that_the_list_of_limits_quotes():
-    text = " ".join((ROOT / "docs/limits.md").read_text(encoding="utf-8").split())
+    text = page("docs/limits.md")
     population = (TABLES / "population" / "population.md").read_text(encoding="utf-8")
     bounds = re.findall(r"^\| (\w+) \| adaptive [^|]*, 1194 \| [^|]+ \| [^|]+ \| ([\d.]+) \(", population, re.M)
     quoted = re.findall(r"within ([\d.]+) % for livers, ([\d.]+) % for kidneys and ([\d.]+) % for stomachs", text)[0]
@@ -157,7 +162,67 @@ def test_numbers_that_the_list_of_limits_quotes():
         ranges.append(f"{near.min():.2f} to {near.max():.2f} %")
     sizes = f"{ranges[0]} with about 994 nodes and {ranges[1]} with about 1,194"
     assert sizes in text
-    assert sizes in " ".join((ROOT / "docs/findings.md").read_text(encoding="utf-8").split())
+    assert sizes in page("docs/findings.md")
+
+
+def test_speeds_that_pages_quote():
+    rows = pd.read_csv(TABLES / "bench.csv").set_index("what")
+    measured = rows["measured"]
+    paper, limits = page("docs/paper.md"), page("docs/limits.md")
+    step = measured["step, 550 surface nodes, m = 1, one plane"]
+    assert f"a step takes {step:.1f} µs" in paper
+    assert re.search(r"([\d,]+) steps, or ([\d,]+) frames of 20", paper).groups() == (
+        f"{1e3 * round(1e3 / step):,.0f}",
+        f"{1e2 * round(1e4 / step / 20):,.0f}",
+    )
+    low, high = re.search(r"rounds [\d.]+ \(([\d.]+) to ([\d.]+)\)", rows["note"]["constraint on / off"]).groups()
+    assert f"{measured['constraint on / off']:.2f} (interval {low} to {high})" in paper
+    alone, called = (measured[f"stomach_slide, 19500 nodes: a step{more}"] for more in ("", " with its call"))
+    assert f"{alone:.2f}; {called:.2f} with the call" in paper
+    for what, shown in (
+        ("a 30 Hz frame", "30 frames a second | {:.1f} |"),
+        ("a 500 Hz update", "at 500 Hz | {:.2f} |"),
+    ):
+        assert rows["met"][f"stomach_slide: {what}"] == "yes"
+        assert shown.format(measured[f"stomach_slide: {what}"]) in paper
+    (each,) = (what for what in rows.index if what.startswith("stomach_slide: an update after each step"))
+    rate = re.search(r"(\d+) Hz", each).group(1)
+    assert f"| update after each step, {rate} Hz | {measured[each]:.2f} |" in paper
+    assert f"takes {measured['stomach_slide: a 500 Hz update']:.2f} ms at the 99th percentile" in limits
+
+
+def test_costs_of_a_cut_that_the_page_quotes():
+    text = (ROOT / "docs/cutting.md").read_text(encoding="utf-8")
+    measured = pd.read_csv(TABLES / "bench.csv").set_index("what")["measured"]
+    lines = re.findall(r"^\| ([\w ]+) \| [\d,]+, [\d,]+ \| (\S+) \| (\S+) \| (\S+)", text, re.M)
+    assert len(lines) == 3
+    for body, event, handed, step in lines:
+        names = ("its event in a run", "handing over positions and velocities", "a step after it over one before")
+        numbers = [measured[f"cut, {body}: {name}"] for name in names]
+        assert [f"{numbers[0]:.2g}", f"{numbers[1]:.2g}", f"{numbers[2]:.2f}"] == [event, handed, step]
+
+
+def test_counts_of_trials_that_pages_quote():
+    breaking, limits = page("docs/breaking.md"), page("docs/limits.md")
+    everything = pd.read_csv(TABLES / "breaking" / "counts.csv").set_index("method").loc["all"]
+    shares = [round(100 * everything[name] / everything["all"]) for name in ("ok", "refused")]
+    assert everything["all"] == 10_000 and "unexplained" not in everything
+    for text in (breaking, limits):
+        assert [int(number) for number in re.search(r"(\d+) % end ok(?:,| and) (\d+) %", text).groups()] == shares
+    solved = pd.read_csv(TABLES / "breaking_reference" / "counts.csv").set_index("choice").loc["all"]
+    assert (
+        f"Of {solved['all']} trials with seed 0 ([the counts](../results/published/breaking_reference/counts.csv) by "
+        f"element, material, kappa/mu, load and body) {solved['ok']} end ok, {solved['refused']} are refused, "
+        f"{solved['not-converged']} do not converge, {solved['inverted']} invert, and {solved['timed-out']} are timed "
+        "out"
+    ) in breaking
+    assert "unexplained" not in solved
+    cut = pd.read_csv(TABLES / "breaking_cuts" / "counts.csv").set_index("kind").loc["all"]
+    counted = re.search(
+        r"Of ([\d,]+) trials with seed 0 [^)]+\)[^)]+\) (\d+) end ok, (\d+) are refused, (\d+) are not", breaking
+    )
+    numbers = [int(number.replace(",", "")) for number in counted.groups()]
+    assert numbers == [cut[name] for name in ("all", "ok", "refused", "not-meshed")]
 
 
 def test_how_far_forces_are_from_those_of_the_second_judge():
@@ -168,7 +233,7 @@ def test_how_far_forces_are_from_those_of_the_second_judge():
         f"{100 * off:.2f} % ({name.removeprefix('judge_')})"
         for name, off in zip(rows["oracle"], rows["deviation"], strict=True)
     ]
-    text = " ".join((ROOT / "docs/theory.md").read_text(encoding="utf-8").split())
+    text = page("docs/theory.md")
     assert f"Forces then differ by {', '.join(shown[:3])} and {shown[3]}." in text
 
 
@@ -220,10 +285,10 @@ def test_methods_of_the_page_are_those_of_the_tuple():
 def test_numbers_that_the_page_quotes_of_the_warning():
     rows = re.findall(r"\| (\d+) " * 5 + r"\|$", (TABLES / "population" / "trust.md").read_text(encoding="utf-8"), re.M)
     _, beyond, named, within, doubted = (sum(int(row[k]) for row in rows) for k in range(5))
-    said = " ".join((ROOT / "docs/population.md").read_text(encoding="utf-8").split())
+    said = page("docs/population.md")
     assert (
         f"In all it is {named} of {beyond} and {doubted} of {within} ({doubted / within:.0%})".replace("%", " %")
         in said
     )
-    brief = " ".join((ROOT / "docs/accuracy.md").read_text(encoding="utf-8").split())
+    brief = page("docs/accuracy.md")
     assert f"named {named} of {beyond} bad bodies and doubted {doubted} of {within} good ones" in brief
