@@ -16,6 +16,7 @@ from reference_fem.elements.evaluate import Evaluator
 from reference_fem.elements.shapes import basis_table, element_nodes
 from reference_fem.elements.surface import point_positions
 from reference_fem.errors import SolveError
+from reference_fem.statics.active_set import look_at
 from reference_fem.statics.newton import StepFailed, solve_step
 from reference_fem.system import assembly
 from reference_fem.system.saddle_point import System
@@ -87,6 +88,20 @@ def carried_contact(coarse: System, pressure: np.ndarray, fine: System) -> np.nd
     return pressure.reshape(len(pressure), -1)[:, near].reshape(len(pressure), *rest[1].shape[:2])
 
 
+def multipliers(system: System, x: np.ndarray, t: float, pressure: np.ndarray) -> np.ndarray:
+    """Multipliers m (no, nf, nq) [Pa] with which the points of a body at x have the contact pressure t = max(0, m -
+    eps g) that is given (docs/theory.md, eq. 6.5).
+
+    A finer surface lies elsewhere than the coarser one by little, and eps times that is up to 25 times the pressure:
+    with the pressures as multipliers the first tangent is not positive definite on volume-preserving changes, and
+    Newton takes 12 iterations in place of 3.
+    """
+    rows, penalty = system.obstacles_at(t), system.surface.penalty[:, None]
+    gap, normal = np.empty_like(pressure), np.empty((*pressure.shape, 3))
+    look_at(rows, point_positions(x, system.surface), gap, normal)
+    return np.where(pressure > 0.0, pressure + penalty * gap, penalty * np.minimum(gap, 0.0))
+
+
 def carried_between_faces(coarse: System, pressure: np.ndarray, fine: System) -> np.ndarray:
     """Pressures (nf, nq) [Pa] between the faces of the coarser cut at the points of the finer one."""
     if not pressure.size:
@@ -105,7 +120,9 @@ def continued(system: System, state: State) -> State:
     Where one step fails, the forces that balance the carried state as it is are taken away little by little: at
     outlines of held regions the strain grows with each refinement, beyond what one step can follow.
     """
-    state = replace(state, x=repaired(system, state.x))
+    x = repaired(system, state.x)
+    as_it_presses = multipliers(system, x, state.t, state.pressure)
+    state = replace(state, x=x, multiplier=as_it_presses, pressure=as_it_presses)
     try:
         return solve_step(system, state, state.t, state.load)
     except StepFailed:

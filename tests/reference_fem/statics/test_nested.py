@@ -13,6 +13,7 @@ from reference_fem import (
     PrescribedDisplacement,
     Problem,
     RigidPlane,
+    RigidSphere,
     SolveError,
     equilibrium_path,
     nodes,
@@ -20,7 +21,7 @@ from reference_fem import (
 from reference_fem.elements.evaluate import Evaluator
 from reference_fem.elements.surface import point_positions
 from reference_fem.statics import nested
-from reference_fem.statics.nested import carried, continued, repaired, transfer, unbalanced
+from reference_fem.statics.nested import carried, continued, multipliers, repaired, transfer, unbalanced
 from reference_fem.statics.newton import StepFailed, solve_step
 from reference_fem.system import assembly
 from reference_fem.system.saddle_point import System
@@ -137,6 +138,12 @@ def apart(system, state, truth):
     return np.abs(displacement(system, state) - truth.u).max() / np.abs(truth.u).max()
 
 
+def as_it_presses(system, state):
+    """A carried state with the multipliers of its pressures."""
+    first = multipliers(system, state.x, state.t, state.pressure)
+    return replace(state, multiplier=first, pressure=first)
+
+
 def test_a_carried_state_is_that_of_the_coarse_mesh(start, coarse_end, round_pair):
     """Held unknowns have the values that they are held at, contact points the pressure of their nearest neighbour."""
     system, state = start
@@ -151,7 +158,9 @@ def test_a_carried_state_is_that_of_the_coarse_mesh(start, coarse_end, round_pai
     near, far = (point_positions(np.zeros(len(s.surface.rest)), s.surface).reshape(-1, 3) for s in (coarse, system))
     nearest = np.array([np.argmin(((near - point) ** 2).sum(axis=1)) for point in far[::17]])
     np.testing.assert_array_equal(state.pressure.ravel()[::17], found.pressure.ravel()[nearest])
-    assert (state.pressure > 0).any() and state.multiplier is state.pressure
+    assert (state.pressure > 0).any()
+    touch = system.evaluate(state.x, system.loads_of(as_it_presses(system, state)), tangent=False).touch
+    np.testing.assert_allclose(touch.pressure, state.pressure, rtol=1e-9, atol=1e-9 * state.pressure.max())
 
 
 def test_the_equilibrium_is_that_of_a_path_from_rest_in_fewer_iterations(start, path):
@@ -161,6 +170,31 @@ def test_the_equilibrium_is_that_of_a_path_from_rest_in_fewer_iterations(start, 
     assert apart(system, state, path[-1]) > 0.05
     assert apart(system, found, path[-1]) < 1e-4
     assert 1 <= found.iterations < 0.7 * sum(step.newton_iterations for step in path)
+
+
+PROBE, DEPTH = 0.15, 0.2
+
+
+def probed(mesh):
+    """An eighth of a ball below a small sphere that comes down."""
+    sphere = RigidSphere((0.0, 0.0, 1.0 + PROBE), PROBE, lambda t: (0.0, 0.0, -DEPTH * t))
+    return Problem(mesh, NeoHookean(1.0, 1000.0), symmetry(), [sphere])
+
+
+def test_a_carried_state_is_stable_under_a_probe_too(monkeypatch):
+    """Its points press as on the coarse mesh, on a surface that lies elsewhere: with the pressures as multipliers they
+    would press up to 26 times as hard, their tangent would not be positive definite, and Newton would take 11 steps."""
+    coarse, fine = ball_octant(4), ball_octant(8)
+    found = []
+    equilibrium_path(probed(coarse), np.linspace(0.1, 1.0, 10), on_checkpoint=found.append)
+    systems = [System(probed(mesh), NewtonSettings()) for mesh in (coarse, fine)]
+    state = carried(systems[0], found[-1].state, systems[1], onto(coarse, fine))
+    touch = systems[1].evaluate(state.x, systems[1].loads_of(state), tangent=False).touch
+    assert touch.pressure.max() > 10 * state.pressure.max()
+    few = continued(systems[1], state).iterations
+    monkeypatch.setattr(nested, "multipliers", lambda system, x, t, pressure: pressure)
+    many = continued(systems[1], state).iterations
+    assert few <= 8 and many > 1.4 * few
 
 
 def failing(monkeypatch, times):
@@ -185,7 +219,7 @@ def test_where_one_step_fails_the_missing_forces_are_taken_away_little_by_little
 ):
     system, state = start
     forces, iterations = failing(monkeypatch, failures)
-    missing = unbalanced(system, state)
+    missing = unbalanced(system, as_it_presses(system, state))
     found = continued(system, state)
     assert apart(system, found, from_rest) < 1e-4
     tried = [0.0 if np.isscalar(force) else force @ missing / (missing @ missing) for force in forces]

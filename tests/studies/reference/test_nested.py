@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from massspring import Sphere, Trajectory
-from reference_fem import SolveError, crosscheck, equilibrium_path
+from reference_fem import NewtonSettings, SolveError, crosscheck, equilibrium_path
 from reference_fem.crosscheck.meridian import MeridianMesh
 from reference_fem.statics.newton import StepFailed
 from studies.base.errors import StudyError
@@ -83,9 +83,9 @@ def test_every_mesh_is_solved_at_every_checkpoint(ball):
     assert {one.unknowns for one in ball.variants.values()} == {ball.meshes[-1].unknowns}
 
 
-def check_path(scene, family, within):
+def check_path(scene, family, within, settings=NewtonSettings()):  # noqa: B008
     """Every checkpoint of the finest mesh is the equilibrium of a path from rest, at tighter tolerances."""
-    path = equilibrium_path(family.problem, scene.checkpoints)
+    path = equilibrium_path(family.problem, scene.checkpoints, settings)
     assert [one.t for one in family.equilibria] == list(scene.checkpoints)
     for one, other in zip(path, family.equilibria, strict=True):
         assert np.abs(one.u - other.u).max() < within * np.abs(one.u).max()
@@ -207,11 +207,14 @@ def ball_under(friction):
     )
 
 
-@pytest.mark.parametrize(("friction", "within"), [(0, 2e-3), ("no_slip", 5e-3)])
-def test_contact_is_found_on_every_mesh(mesh_cache, friction, within):
+@pytest.mark.parametrize(
+    ("friction", "within", "settings"),
+    [(0, 2e-3, NewtonSettings(penetration_tol=1e-5)), ("no_slip", 5e-3, NewtonSettings())],
+)
+def test_contact_is_found_on_every_mesh(mesh_cache, friction, within, settings):
     """Within how far points may sink in, and slip from step to step; without slip by a path from rest on each mesh, as
     what an obstacle holds depends on its way."""
     scene = ball_under(friction)
     found = solve_nested(scene, VARIANTS)
     assert (found.stopped, found.failure, len(found.samples)) == ("", "", 3)
-    check_path(scene, found, within)
+    check_path(scene, found, within, settings)
