@@ -32,7 +32,7 @@ GROWTH = 2.5
 LEAST_GROWTH = 1.5
 """The same at least, also where the plan's `most` is smaller."""
 LOOSE = NewtonSettings(force_tol=1e-4)
-"""On all meshes but the coarsest."""
+"""On all meshes but the coarsest: a looser balance of forces than usual, the usual penetration."""
 DISPLACEMENT = 2.5
 """Bar of the mean displacement that weighs as much as one of the force: it falls faster, so less is allowed."""
 

@@ -30,9 +30,9 @@ MINUTES = {
     "python -m studies.exchange.peers.main --sweep": 15.0,
     "organbench verify": 20.0,
     "organbench report --figures": 5.0,
-    "make bench": 20.0,
-    "make fuzz": 60.0,
-    "python -m studies.bench.meshes": 30.0,
+    "make bench": 10.0,
+    "make fuzz": 30.0,
+    "python -m studies.bench.meshes": 10.0,
     "python -m studies.tools.silicone.main": 10.0,
 }
 """Rough, of two cores that do nothing else; how long a study takes its cases tell."""

@@ -104,8 +104,8 @@ def test_the_plan_alone_runs_nothing_and_says_how_long(two_steps, tmp_path, caps
     release.main(dry=True, results=tmp_path)
     assert two_steps[0] == []
     *lines, whole = capsys.readouterr().out.splitlines()
-    assert lines[1] == " 2  make bench (bench.csv): about 20 min"
-    assert whole.startswith("about 0.8 h in all")  # 30 and 20 minutes
+    assert lines[1] == " 2  make bench (bench.csv): about 10 min"
+    assert whole.startswith("about 0.3 h in all")  # 10 and 10 minutes
 
 
 def test_a_study_takes_what_its_cases_take(tmp_path):
