@@ -93,6 +93,9 @@ class Study:
     """Whether it belongs to `make study`, and to `organbench run` without a name."""
     counts_losses: bool = False
     """Whether cases and references that fail are part of its answer: it is published with them."""
+    scene_by_scene: bool = False
+    """Whether its scenes run one after the other, each with its reference and all its cases, so that a study cut short
+    has whole scenes; otherwise the longest jobs of all scenes come first."""
     word: str = field(default="", compare=False)
     """What the command line calls it where that is not its name: FILE.py, or NAME@FOLDER."""
     expects: tuple[str, ...] = ()

@@ -255,8 +255,12 @@ def reference_jobs(root: Path, scenes: Iterable[Scene]) -> list[ReferenceJob]:
 
 
 def jobs_of(root: Path, studies: Iterable[Study]) -> list[Job]:
-    """Everything the studies need, each result once, longest first."""
+    """Everything the studies need, each result once: longest first, then what a study wants scene by scene."""
     jobs: dict[Path, Job] = {}
-    for study in studies:
-        jobs |= {job.path(): job for job in (*reference_jobs(root, study.scenes), *case_jobs(root, study))}
-    return sorted(jobs.values(), key=lambda job: -job.weight)
+    turns: dict[Path, int] = {}
+    for study in sorted(studies, key=lambda study: study.scene_by_scene):
+        turn = {scene.name: 1 + at if study.scene_by_scene else 0 for at, scene in enumerate(study.scenes)}
+        for job in (*reference_jobs(root, study.scenes), *case_jobs(root, study)):
+            jobs.setdefault(job.path(), job)
+            turns.setdefault(job.path(), turn[job.work.scene.name])
+    return sorted(jobs.values(), key=lambda job: (turns[job.path()], -job.weight))

@@ -42,8 +42,8 @@ def recipes_for(scene: Scene) -> tuple[tuple[BodyRecipe, float], ...]:
 
 
 def population_study(populations: Sequence[Population] = MEMBERS, name: str = POPULATION) -> Study:
-    """Every recipe on every member; members of different organs take turns, so that a study cut short knows them all.
-    The first member of each organ is timed.
+    """Every recipe on every member, one member after the other. Organs take turns: a study cut short has whole members
+    of each. The first member of each organ is timed.
 
     Raises StudyError for a member that cannot be drawn.
     """
@@ -63,6 +63,7 @@ def population_study(populations: Sequence[Population] = MEMBERS, name: str = PO
             Chart("front.png", "studies.plots.campaigns.population:draw_front"),
         ),
         counts_losses=True,
+        scene_by_scene=True,
         columns=(
             "force_end",
             "mean_error",

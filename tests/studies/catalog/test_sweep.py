@@ -124,6 +124,18 @@ def test_references_are_shared_and_come_first(tmp_path):
     assert len({job.path() for job in jobs}) == 6
 
 
+def test_a_study_scene_by_scene_finishes_one_before_the_next_and_after_the_others(tmp_path):
+    larger = replace(SCENE, name="larger", reference=ReferencePlan("octant", (0.5, 0.25)))
+    study = tiny_study(cases=(tiny_case(scene=SCENE), tiny_case(scene=larger)))
+    turns = replace(study, name="turns", scene_by_scene=True)
+    reference, case, larger_reference, larger_case = jobs_of(tmp_path, [turns])
+    assert [reference.label, larger_reference.label] == ["reference ball_squeeze", "reference larger"]
+    assert [case.work.scene.name, larger_case.work.scene.name] == ["ball_squeeze", "larger"]
+    together = [(job.study, job.label) for job in jobs_of(tmp_path, [turns, study])]
+    assert [label for _, label in together[:2]] == ["reference larger", "reference ball_squeeze"]
+    assert [name for name, _ in together[2:]] == [study.name, study.name, "turns", "turns"]
+
+
 def test_results_that_cannot_be_written_are_told_before_anything_runs(tmp_path, monkeypatch):
     (tmp_path / "file").write_text("no folder")
     monkeypatch.setattr(Local, "map", lambda *_: pytest.fail("nothing may run"))
