@@ -138,7 +138,9 @@ def test_a_scheduler_that_dies_half_way_is_one_sentence_and_what_is_finished_sta
         worker = started(["studies", "worker", "--scheduler-file", str(file)], log)
         try:
             address = address_in(file)
-            gone = pytest.raises(StudyError, match=r"the Dask scheduler is gone.*run the same command to continue")
+            gone = pytest.raises(
+                StudyError, match=r"the Dask scheduler no longer answers.*run the same command to continue"
+            )
             with gone, engine_at(address, 60.0) as engine:
                 run_studies(tmp_path / "results", [study], engine, Killer(scheduler))
         finally:

@@ -138,4 +138,4 @@ def test_a_worker_without_organbench_is_refused_by_name(file, tmp_path):
     words = ["--scheduler-file", str(file), "--name", "bare", "--no-dashboard", "--no-nanny"]
     with running([sys.executable, "-c", WITHOUT, *words], tmp_path):
         said = refusal(file, tmp_path)
-    assert said.startswith("worker bare has no organbench that can be loaded;")
+    assert said.startswith("worker bare cannot load organbench;")
