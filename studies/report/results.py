@@ -73,7 +73,7 @@ def report(ledger: Ledger, studies: Sequence[Study]) -> tuple[list[Path], list[s
     report.html, which shows all of it in one page; paths, and what is missing in sentences.
     """
     written, remarks = charts_and_tables(ledger, studies)
-    league, unread = write_league(ledger.root)
+    league, unread = write_league(ledger.root, with_report=True)
     page, left_out = write_page(ledger.root, studies, league_cards(ledger.root))
     return [*written, *league, *([page] if page else [])], [*remarks, *unread, *left_out]
 

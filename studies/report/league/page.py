@@ -42,9 +42,11 @@ HEADS = {
 }
 
 
-def write_league(root: Path) -> tuple[list[Path], list[str]]:
+def write_league(root: Path, with_report: bool = False) -> tuple[list[Path], list[str]]:
     """Table, chart and page of what is entered below the results folder `root`; their paths, none without an entry, and
-    what cannot be read, in sentences. Raises StudyError where something cannot be written."""
+    what cannot be read, in sentences. with_report: the page links to report.html, which is written next to it.
+
+    Raises StudyError where something cannot be written."""
     from studies.plots.campaigns.league import draw  # with matplotlib, which takes half a second to load
     from studies.plots.style.style import svg_copies
 
@@ -56,7 +58,7 @@ def write_league(root: Path) -> tuple[list[Path], list[str]]:
     write_table(folder / TABLE, pd.DataFrame(rows))
     with svg_copies() as pictures:
         draw(profiles(rows), folder / CHART)
-    write_whole(root / NAME, page(rows, pictures[CHART]))
+    write_whole(root / NAME, page(rows, pictures[CHART], with_report))
     return [folder / TABLE, folder / CHART, root / NAME], remarks
 
 
@@ -85,13 +87,14 @@ def profiles(rows: Sequence[Row]) -> Any:
     return Profiles(words, tuple(BUDGETS.values()), of, (note,))
 
 
-def page(rows: Sequence[Row], svg: str) -> bytes:
-    """The file."""
+def page(rows: Sequence[Row], svg: str, with_report: bool = False) -> bytes:
+    """The file, with a link to report.html or without."""
     return (
         TEMPLATES.get_template("league.html")
         .render(
             style=Markup((ASSETS / "page.css").read_text(encoding="utf-8")),
             set=SET,
+            with_report=with_report,
             scenes=[name for name, one in frozen().items() if not one.held_back],
             held=[(name, one) for name, one in frozen().items() if one.held_back],
             chart=Markup(inline(svg, "profiles", "Share of the pairs within a tolerance over the budget")),

@@ -23,6 +23,8 @@ PROFILED = {"force_end": SOLID[0], "mean_error": SOLID[1]}
 """Quantities of profiles -> what is usually enough [%]; all scenes of the set are of solid organs."""
 COST, COUNT = "cost [s/s]", "evaluations [1/s]"
 """Computing time, and evaluations of all forces, for a simulated second."""
+ROUNDING = 1e-6
+"""Smaller sizes [%] come from rounding."""
 Row = Mapping[str, Any]
 
 
@@ -137,15 +139,15 @@ def _card(name: str, rows: Sequence[Row], asked: Mapping[tuple[str, str], float]
         "ranges": {column: _range(judged, f"{column} [%]") for column in COLUMNS},
         "cost": _range(judged, COST),
         "count": _range(judged, COUNT),
-        "solved": f"{len(solved)} of {len(asked)}",
+        "solved": f"{len(solved)} of {len(asked)}" if judged else "–",
         "missing": missing,
         "cannot": [f"{', '.join(scenes)}: {reason}" for reason, scenes in cannot.items()],
     }
 
 
 def _range(rows: Sequence[Row], column: str) -> str:
-    """ "1.2 to 41": smallest and largest size; a dash where nothing is known."""
-    values = [abs(row[column]) for row in rows if row[column] == row[column]]
+    """ "1.2 to 41": smallest and largest size; a dash where nothing is known, 0 below ROUNDING."""
+    values = [abs(row[column]) if abs(row[column]) > ROUNDING else 0.0 for row in rows if row[column] == row[column]]
     if not values:
         return "–"
     low, high = (f"{value:.2g}" if value < 100 else f"{value:,.0f}" for value in (min(values), max(values)))

@@ -44,6 +44,7 @@ ROWS = [
 ]
 
 
+SVG = '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 9 9"><g/></svg>'
 ASKED = {("ball_squeeze", "force_end"): 0.5, ("liver_press", "force_end"): 0.5, ("liver_press", "mean_error"): 0.1}
 
 
@@ -83,10 +84,21 @@ def test_cards_say_the_range_and_the_reasons():
     free = cards([row("free", "liver_press", 1.0, 0.5, NAN)])[0]
     assert free["solved"] == "2 of 9" and free["cost"] == "–"
     assert a["missing"] == ["ball_clamped", "liver_probe", "kidney_probe"]
+    lost = cards([row("lost", "liver_press", NAN, NAN, NAN, status="skipped", message="lost: no", **LOST)])[0]
+    assert lost["solved"] == "–", "nothing was judged: that is no failure in nine pairs"
+    assert a["ranges"]["penetration"] == "0"
+    (rounded,) = cards([row("a", "liver_press", 1.0, 0.5, 1.0) | {"penetration [%]": 2.7e-9}])
+    assert rounded["ranges"]["penetration"] == "0"
+
+
+@pytest.mark.parametrize("with_report", [False, True])
+def test_the_page_links_to_a_report_only_where_one_is_written(with_report):
+    """The published copy has no report next to it."""
+    assert ("report.html" in page(ROWS, SVG, with_report).decode()) == with_report
 
 
 def made_page() -> str:
-    return page(ROWS, '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 9 9"><g/></svg>').decode()
+    return page(ROWS, SVG).decode()
 
 
 def test_the_page_shows_every_row_and_every_hash_of_what_is_held_back():
