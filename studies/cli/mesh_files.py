@@ -74,14 +74,14 @@ class Telling(logging.Handler):
     def __init__(self, what: str, status: Status | None):
         """what: the work as a whole; status: the terminal's moving line."""
         super().__init__()
-        self.what, self.status, self.told = what, status, time.monotonic()
+        self.what, self.status, self.last_report = what, status, time.monotonic()
 
     def emit(self, record: logging.LogRecord) -> None:
         """Called for each stage."""
         if self.status is not None:
             self.status.update(escape(f"{self.what} … {record.getMessage()}"))
-        elif time.monotonic() - self.told > 2 * BEAT:
-            self.told = time.monotonic()
+        elif time.monotonic() - self.last_report > 2 * BEAT:
+            self.last_report = time.monotonic()
             errors.print(f"{self.what} … {record.getMessage()}", markup=False, highlight=False)
 
 

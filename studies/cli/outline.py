@@ -51,8 +51,8 @@ def _registered(module: str, registry: str) -> list[tuple[str, str]]:
 
 def _assigned(node: Any, name: str) -> Any:
     """The value of NAME: type = value in a module or class."""
-    found = (one for one in node.body if isinstance(one, ast.AnnAssign) and ast.unparse(one.target) == name)
-    return next(found).value
+    assignments = (one for one in node.body if isinstance(one, ast.AnnAssign) and ast.unparse(one.target) == name)
+    return next(assignments).value
 
 
 def _defined(tree: ast.Module, name: str) -> Any:

@@ -46,7 +46,7 @@ class TerminalProgress:
         """What is done, by kind."""
         self.compiled: set[str] = set()
         self.last_report = time.monotonic()
-        self.compiling_told = 0.0
+        self.last_compile_report = 0.0
 
     def __enter__(self) -> "TerminalProgress":
         if self.console.is_terminal:
@@ -92,8 +92,8 @@ class TerminalProgress:
         if self.console.is_terminal:
             for task in self.tasks.values():
                 self.bars.update(task, note=f"compiling {name} …")
-        elif time.monotonic() - self.compiling_told > QUIET_SECONDS:
-            self.compiling_told = time.monotonic()
+        elif time.monotonic() - self.last_compile_report > QUIET_SECONDS:
+            self.last_compile_report = time.monotonic()
             self._line(f"compiling {name} (kept for the next time)")
 
     def _line(self, text: str) -> None:
@@ -131,8 +131,8 @@ def dry_run(console: Console, study: str, planned: list[Planned], jobs: int, roo
     groups: dict[tuple[str, str], list[Planned]] = {}
     for piece in planned:
         groups.setdefault((piece.kind, "missing" if piece.why == MISSING else piece.why), []).append(piece)
-    for (kind, why), found in groups.items():
-        say(f"  {amounts(Counter({kind: len(found)}))} ({why}): about {words(expected(found, 1))} of computing")
+    for (kind, why), pieces in groups.items():
+        say(f"  {amounts(Counter({kind: len(pieces)}))} ({why}): about {words(expected(pieces, 1))} of computing")
     say(f"  about {words(expected(planned, jobs))} with {jobs} processes, {basis(planned)}; compiling comes on top")
     say(f"  {disk(planned, root)}")
 
@@ -152,7 +152,7 @@ def disk(planned: list[Planned], root: Path) -> str:
     """What pieces will store, and what the disk has left."""
     stored, unknown = expected_bytes(planned)
     free = free_bytes(root)
-    more = f" (without {unknown} reference solutions of unknown size)" if unknown else ""
+    more = f" (without {amounts(Counter({'reference': unknown}))} of unknown size)" if unknown else ""
     if stored > free:
         return (
             f"about {decimal(stored)}{more}, more than the {decimal(free)} that are free: make room (`organbench "

@@ -41,8 +41,8 @@ def kept_volumes(ledger: Ledger, studies: Sequence[Study]) -> pd.DataFrame:
             entry = ledger.entry(job)
             if promised(job.work) and entry is not None and entry.status in COMPARABLE:
                 jobs[entry.file] = job
-        found = ledger.measured(study.name, "kept volumes", dict.fromkeys(jobs, code), partial(_row, jobs))
-        rows |= {jobs[file].work.replaced(recorded=()).key: row for file, row in found.items()}
+        by_file = ledger.measured(study.name, "kept volumes", dict.fromkeys(jobs, code), partial(_row, jobs))
+        rows |= {jobs[file].work.replaced(recorded=()).key: row for file, row in by_file.items()}
     table = pd.DataFrame(list(rows.values()))
     return table if table.empty else table.sort_values(WORST, ascending=False)
 

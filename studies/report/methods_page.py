@@ -97,12 +97,12 @@ def reasons(methods: Iterable[Method]) -> list[list[str]]:
     """Rows of the last table: for each option the reasons why not, and which methods give them."""
     rows = []
     for name, title in OPTIONS.items():
-        found: dict[str, list[str]] = {}
+        by_reason: dict[str, list[str]] = {}
         for method in methods:
             answer = getattr(method.capabilities, name)
             if isinstance(answer, No):
-                found.setdefault(answer.because, []).append(words(method))
-        rows += [[title, "; ".join(who), because] for because, who in found.items()]
+                by_reason.setdefault(answer.because, []).append(words(method))
+        rows += [[title, "; ".join(who), because] for because, who in by_reason.items()]
     return rows
 
 

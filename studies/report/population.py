@@ -70,20 +70,22 @@ def worst_of(runs: Sequence[Run]) -> str:
     ]
     finest: dict[str, Group] = {group.organ: group for group in groups(runs)}  # recipes are in order of size
     for group in finest.values():
-        lost = [run for run in group.runs if run.record.status != Status.OK]
-        judged = [run for run in group.runs if run not in lost and DISPLACEMENT(run) == DISPLACEMENT(run)]
+        failures = [run for run in group.runs if run.record.status != Status.OK]
+        judged = [run for run in group.runs if run not in failures and DISPLACEMENT(run) == DISPLACEMENT(run)]
         for run in sorted(judged, key=DISPLACEMENT, reverse=True)[:WORST]:
             cells = [_value(FORCE, run, "+"), _value(DISPLACEMENT, run), _number(rigid_share(run))]
             cells += [f"{facets:.0f}" if (facets := contact_facets(run)) == facets else "–", _number(contact_turn(run))]
             cells += [_number(run.shape.distance * 100.0), _warning(run)]
             lines.append(f"| {run.case.scene.name} | " + " | ".join(cells) + " |")
-        lines += [f"| {run.case.scene.name} | {run.record.status} |{' – |' * 5} {run.record.message} |" for run in lost]
+        lines += [
+            f"| {run.case.scene.name} | {run.record.status} |{' – |' * 5} {run.record.message} |" for run in failures
+        ]
     return "\n".join(lines) if len(lines) > 2 else NONE
 
 
 def _value(entry: Metric, run: Run, sign: str = "") -> str:
-    value, known = entry(run), entry.uncertainty(run)
-    return f"{value:{sign}.2g} ± {known:.1g}" if value == value else "–"
+    value, uncertainty = entry(run), entry.uncertainty(run)
+    return f"{value:{sign}.2g} ± {uncertainty:.1g}" if value == value else "–"
 
 
 def _warning(run: Run) -> str:
@@ -98,14 +100,14 @@ def rigid_share(run: Run) -> float:
     Translation and small rotation by least squares, weighted by area. It is near 100 where the whole organ is turned,
     as by a contact force that points the wrong way, and small where the error is local. NaN where nothing is compared.
     """
-    found = run.boundary_errors
-    if found is None:
+    errors = run.boundary_errors
+    if errors is None:
         return float("nan")
-    root = np.sqrt(found.areas)[:, None]
-    arms = found.places - np.average(found.places, axis=0, weights=found.areas)
+    root = np.sqrt(errors.areas)[:, None]
+    arms = errors.places - np.average(errors.places, axis=0, weights=errors.areas)
     columns = [np.tile(axis, (len(arms), 1)) for axis in np.eye(3)] + [np.cross(axis, arms) for axis in np.eye(3)]
     motions = np.stack([(root * column).ravel() for column in columns], axis=1)
-    wrong = (root * found.wrong).ravel()
+    wrong = (root * errors.wrong).ravel()
     left = wrong - motions @ np.linalg.lstsq(motions, wrong)[0]
     return 100.0 * (1.0 - float(left @ left) / float(wrong @ wrong))
 
@@ -113,24 +115,24 @@ def rigid_share(run: Run) -> float:
 def trust_of(runs: Sequence[Run]) -> str:
     """How often the comparison of two meshes names a member whose finer body is beyond the target, and doubts one that
     is within, of members of even and of odd number."""
-    found = judgements(runs)
-    if not found:
+    comparisons = judgements(runs)
+    if not comparisons:
         return NONE
     lines = [
         "| meshes | members | beyond the target | named | within it | doubted |",
         "|---|---|---|---|---|---|",
     ]
-    for words, some in _halves(found).items():
+    for words, some in _halves(comparisons).items():
         count = tally(some)
         cells = [len(some), count.beyond, count.named, count.within, count.doubted]
         lines.append(f"| {words} | " + " | ".join(str(cell) for cell in cells) + " |")
     return "\n".join(lines)
 
 
-def _halves(found: Sequence[Judgement]) -> dict[str, list[Judgement]]:
+def _halves(comparisons: Sequence[Judgement]) -> dict[str, list[Judgement]]:
     """Judgements by pair of meshes and half of the members."""
     halves: dict[str, list[Judgement]] = {}
-    for one in found:
+    for one in comparisons:
         half = "odd" if int(one.scene.rsplit("_", 1)[1]) % 2 else "even"
         halves.setdefault(f"{one.nodes[0]:,} and {one.nodes[1]:,} nodes, members of {half} number", []).append(one)
     return halves

@@ -199,32 +199,32 @@ def check(home: Path, studies: Sequence[Study]) -> list[Finding]:
     commands |= {name: extra.command for name, extra in EXTRAS.items()}
     every = "make publish"
     catalogue = [study for study in studies if study.name not in APART]
-    makers = _codes(catalogue, list(EXTRAS)) | _codes([s for s in studies if s.name in APART], (), whole=False)
-    known = {name: (code, f"run `{commands.get(name, every)}`") for name, code in makers.items()}
-    odd = [file for file in _files(target) if not _names(file, target) & {*known, FILE, "machine.json"}]
+    codes = _codes(catalogue, list(EXTRAS)) | _codes([s for s in studies if s.name in APART], (), whole=False)
+    makers = {name: (code, f"run `{commands.get(name, every)}`") for name, code in codes.items()}
+    odd = [file for file in _files(target) if not _names(file, target) & {*makers, FILE, "machine.json"}]
     if odd:
         raise StudyError(f"{odd[0]} is published, and nothing makes it; remove it, or add what does to EXTRAS")
-    return [*compared(target, known), *_blocks(home)]
+    return [*compared(target, makers), *_blocks(home)]
 
 
 def _blocks(home: Path) -> list[Finding]:
     """Whether the pages show the tables and sentences that are published."""
     texts = [(one.page, one.marks, (home / PUBLISHED / one.file)) for one in SUMMARIES]
-    wanted = [(page, marks, file.read_text(encoding="utf-8")) for page, marks, file in texts if file.is_file()]
-    wanted += [(one.page, one.marks, one.written(home / PUBLISHED)) for one in SENTENCES]
-    found = []
-    for page, marks, text in wanted:
-        shown = _read(home / page)
-        same = between(shown, marks, text, home / page) == shown
+    blocks = [(page, marks, file.read_text(encoding="utf-8")) for page, marks, file in texts if file.is_file()]
+    blocks += [(one.page, one.marks, one.written(home / PUBLISHED)) for one in SENTENCES]
+    findings = []
+    for page, marks, text in blocks:
+        content = _read(home / page)
+        same = between(content, marks, text, home / page) == content
         words = "" if same else "it does not show what is published; publish again, and leave the block as it is"
-        found.append(Finding(f"{page}, {marks[0]}", CURRENT if same else STALE, words))
-    return found
+        findings.append(Finding(f"{page}, {marks[0]}", CURRENT if same else STALE, words))
+    return findings
 
 
 def check_entries(root: Path, command: str) -> None:
     """Raises StudyError for an entry below `root` that other code judged."""
-    known = fingerprints()
-    old = [path for path in entry_files(root) if peek(path).fingerprint not in known]
+    current = fingerprints()
+    old = [path for path in entry_files(root) if peek(path).fingerprint not in current]
     if old:
         raise StudyError(
             f"not published: {old[0]} and {len(old) - 1} more entries were judged by other code; run `{command}`, and "
@@ -251,9 +251,9 @@ def show_summaries(root: Path, studies: Sequence[Study], home: Path) -> None:
     Raises StudyError, before anything is written, where a page or its marks are missing.
     """
     names = [study.name for study in studies]
-    told = [summary for summary in SUMMARIES if summary.study in names]
+    summaries = [summary for summary in SUMMARIES if summary.study in names]
     pages = dict[Path, str]()
-    for summary in told:
+    for summary in summaries:
         page = home / summary.page
         text = (root / summary.file).read_text(encoding="utf-8")
         pages[page] = between(pages.get(page) or _read(page), summary.marks, text, page)
@@ -277,11 +277,11 @@ def check_studies(ledger: Ledger, studies: Sequence[Study], done: str = "publish
     done then."""
     behind = dict[str, list[str]]()
     for study in studies:
-        lacking = [f"{one.job.label} is {one.status}" for one in standings(ledger, study) if not one.ended]
+        gaps = [f"{one.job.label} is {one.status}" for one in standings(ledger, study) if not one.ended]
         untimed = [job for job in timed_jobs(ledger, study) if ledger.why_untimed(job) is not None]
-        lacking += [f"the frame time of {job.label} is missing or stale" for job in untimed]
-        if lacking:
-            behind[study.name] = lacking
+        gaps += [f"the frame time of {job.label} is missing or stale" for job in untimed]
+        if gaps:
+            behind[study.name] = gaps
     if behind:
         count, first = sum(map(len, behind.values())), next(iter(behind.values()))[0]
         raise StudyError(
@@ -309,8 +309,8 @@ def check_extras(root: Path, names: Sequence[str]) -> None:
 
 def _files(place: Path) -> list[Path]:
     """A file, or the tables and charts below a folder, sorted; none where there is nothing."""
-    found = [place] if place.is_file() else sorted(place.rglob("*"))
-    return [file for file in found if file.is_file() and file.suffix in SUFFIXES]
+    files = [place] if place.is_file() else sorted(place.rglob("*"))
+    return [file for file in files if file.is_file() and file.suffix in SUFFIXES]
 
 
 def _read(page: Path) -> str:

@@ -71,24 +71,24 @@ def noted(published: Path) -> dict[str, str]:
         raise StudyError(f"{path} cannot be read ({error}); restore it from git") from error
 
 
-def note(published: Path, made: Mapping[str, str]) -> Path:
+def note(published: Path, new: Mapping[str, str]) -> Path:
     """Notes by which code these names were made; those that are no longer there are forgotten. Where the note lies."""
-    known = {name: code for name, code in noted(published).items() if (published / name).exists()}
-    text = json.dumps(dict(sorted((known | dict(made)).items())), indent=1) + "\n"
+    codes = {name: code for name, code in noted(published).items() if (published / name).exists()}
+    text = json.dumps(dict(sorted((codes | dict(new)).items())), indent=1) + "\n"
     write_whole(published / FILE, text.encode())
     return published / FILE
 
 
 def compared(published: Path, makers: Mapping[str, tuple[Callable[[], str], str]]) -> list[Finding]:
     """What is published, name by name. makers: the hash of the present code, and the command that makes it again."""
-    known, found = noted(published), []
+    codes, findings = noted(published), []
     for name, (code, command) in makers.items():
         if not (published / name).exists():
             continue
-        if name not in known:
-            found.append(Finding(name, UNKNOWN, f"published before its code was noted; {command}, then publish it"))
-        elif known[name] == code():
-            found.append(Finding(name, CURRENT))
+        if name not in codes:
+            findings.append(Finding(name, UNKNOWN, f"published before its code was noted; {command}, then publish it"))
+        elif codes[name] == code():
+            findings.append(Finding(name, CURRENT))
         else:
-            found.append(Finding(name, STALE, f"other code made it; {command}, then publish it"))
-    return found
+            findings.append(Finding(name, STALE, f"other code made it; {command}, then publish it"))
+    return findings

@@ -22,10 +22,10 @@ from studies.sweep.load import References
 TABLE, CHART = "uncertainty.csv", "uncertainty.png"
 
 
-def known_references(references: References, scenes: Iterable[Scene]) -> dict[str, Reference]:
+def references_by_scene(references: References, scenes: Iterable[Scene]) -> dict[str, Reference]:
     """Those that are solved on all their meshes, by the name of their scene; the study reports the others."""
-    found = {scene.name: references.of(scene) for scene in scenes}
-    return {name: reference for name, reference in found.items() if reference is not None}
+    by_scene = {scene.name: references.of(scene) for scene in scenes}
+    return {name: reference for name, reference in by_scene.items() if reference is not None}
 
 
 def shape_of_reference(reference: Reference) -> ShapeErrors:
@@ -40,16 +40,16 @@ def uncertainty_table(references: Mapping[str, Reference]) -> pd.DataFrame:
     rows = []
     for scene, reference in references.items():
         shape = shape_of_reference(reference)
-        for quantity, known in reference.uncertainty.items():
-            shares = {f"{name} [%]": 100 * known.shares.get(name, float("nan")) for name in ("mesh", *FACTORS)}
+        for quantity, uncertainty in reference.uncertainty.items():
+            shares = {f"{name} [%]": 100 * uncertainty.shares.get(name, float("nan")) for name in ("mesh", *FACTORS)}
             rows.append(
                 {
                     "scene": scene,
                     "quantity": quantity,
                     **shares,
-                    "uncertainty [%]": 100 * known.total,
-                    "order [1]": known.order,
-                    "extrapolated shift [%]": 100 * known.shift,
+                    "uncertainty [%]": 100 * uncertainty.total,
+                    "order [1]": uncertainty.order,
+                    "extrapolated shift [%]": 100 * uncertainty.shift,
                     "meshes": len(reference.meshes),
                     "unknowns": reference.record.attributes["unknowns"],
                     "shape_error [%]": 100 * shape.distance,
@@ -74,7 +74,7 @@ def refresh_uncertainty(references: References, scenes: Iterable[Scene]) -> list
     stamp = root / "cache" / f"{STUDY}.drawn"
     if all(path.exists() for path in (*paths, stamp)) and stamp.read_bytes() == state.encode():
         return paths
-    solved = known_references(references, each)
+    solved = references_by_scene(references, each)
     if not solved:
         return []
     from studies.plots.uncertainty import draw  # with matplotlib, which takes half a second to load

@@ -63,15 +63,15 @@ class Step:
 def steps(studies: Sequence[Study] = STUDIES) -> list[Step]:
     """All, in their order: studies, other programs, what belongs to no study, publishing, pages."""
     alone = {one.study: one.file for one in SUMMARIES if "/" not in one.file}
-    found = [
+    makers = [
         Step(f"organbench run {name}", (name, alone[name]) if name in alone else (name,), name)
         for name in [*(study.name for study in studies), *APART]
     ]
     order = [SWEEP, LEAGUE, *EXTRAS]  # settings of the league come from the sweep
     commands = dict.fromkeys(EXTRAS[name].command for name in order)
-    found += [Step(c, tuple(name for name, extra in EXTRAS.items() if extra.command == c)) for c in commands]
+    makers += [Step(c, tuple(name for name, extra in EXTRAS.items() if extra.command == c)) for c in commands]
     return [
-        *found,
+        *makers,
         Step("organbench publish", (REFERENCES, KEPT, FILE, "machine.json")),
         Step(f"organbench publish {' '.join(APART)}"),
         Step("python -m studies.report.methods_page"),
@@ -89,23 +89,23 @@ def seconds_of(step: Step, ledger: Ledger) -> float:
     return 60.0 * MINUTES.get(step.command, FEW_MINUTES)
 
 
-def told(found: Sequence[Step], seconds: Sequence[float]) -> list[str]:
+def schedule(all_steps: Sequence[Step], seconds: Sequence[float]) -> list[str]:
     """The plan, a line for each step."""
     lines = []
-    for number, (step, cost) in enumerate(zip(found, seconds, strict=True), 1):
+    for number, (step, cost) in enumerate(zip(all_steps, seconds, strict=True), 1):
         how_long = f"about {max(1.0, cost / 60.0):.0f} min" if cost else "current, nothing to do"
-        made = f" ({', '.join(step.makes)})" if step.makes else ""
-        lines.append(f"{number:2}  {step.command}{made}: {how_long}")
+        products = f" ({', '.join(step.makes)})" if step.makes else ""
+        lines.append(f"{number:2}  {step.command}{products}: {how_long}")
     hours = sum(seconds) / 3600.0
     return [*lines, f"about {hours:.1f} h in all; references that are not published are solved with their studies"]
 
 
-def check_complete(published: Path, found: Sequence[Step]) -> None:
+def check_complete(published: Path, all_steps: Sequence[Step]) -> None:
     """Raises StudyError for something in the published folder that no step makes."""
-    made = {name for step in found for name in step.makes}
-    lost = [path.name for path in sorted(published.glob("*")) if path.name not in made]
-    if lost:
-        raise StudyError(f"no step makes {published / lost[0]}; add it to EXTRAS (studies/report/publish.py)")
+    names = {name for step in all_steps for name in step.makes}
+    orphans = [path.name for path in sorted(published.glob("*")) if path.name not in names]
+    if orphans:
+        raise StudyError(f"no step makes {published / orphans[0]}; add it to EXTRAS (studies/report/publish.py)")
 
 
 def check_commit(home: Path) -> str:
@@ -118,10 +118,10 @@ def check_commit(home: Path) -> str:
 
 
 def _git(home: Path, *words: str) -> str:
-    ended = subprocess.run(["git", *words], cwd=home, capture_output=True, text=True)
-    if ended.returncode != 0:
-        raise StudyError(f"git {words[0]} fails here ({ended.stderr.strip()}); publish from a clone of the repository")
-    return ended.stdout.strip()
+    result = subprocess.run(["git", *words], cwd=home, capture_output=True, text=True)
+    if result.returncode != 0:
+        raise StudyError(f"git {words[0]} fails here ({result.stderr.strip()}); publish from a clone of the repository")
+    return result.stdout.strip()
 
 
 def main(
@@ -129,24 +129,24 @@ def main(
     results: Annotated[Path, typer.Option(help="folder of the results")] = Path("results"),
 ) -> None:
     """Makes what is missing or stale, publishes it, and checks that all is current."""
-    found, ledger = steps(), Ledger(results)
-    check_complete(PUBLISHED, found)
-    seconds = [seconds_of(step, ledger) for step in found]
-    print("\n".join(told(found, seconds)), flush=True)
+    all_steps, ledger = steps(), Ledger(results)
+    check_complete(PUBLISHED, all_steps)
+    seconds = [seconds_of(step, ledger) for step in all_steps]
+    print("\n".join(schedule(all_steps, seconds)), flush=True)
     if dry:
         return
     print(f"commit {check_commit(Path('.'))}", flush=True)
     if not crosscheck.available():
         raise StudyError("NGSolve, a second opinion in `organbench verify`, is missing; install organbench[crosscheck]")
-    for number, step in enumerate(found, 1):
+    for number, step in enumerate(all_steps, 1):
         ledger.look_again()
         if not seconds_of(step, ledger):
             continue
-        print(f"{number} of {len(found)}: {step.command}", flush=True)
-        ended = subprocess.run(step.words)
-        if ended.returncode != 0:
+        print(f"{number} of {len(all_steps)}: {step.command}", flush=True)
+        result = subprocess.run(step.words)
+        if result.returncode != 0:
             raise StudyError(
-                f"`{step.command}` ended with exit code {ended.returncode}, so nothing after it was done; repair what "
+                f"`{step.command}` ended with exit code {result.returncode}, so nothing after it was done; repair what "
                 "it says and start again: what is done stays"
             )
 

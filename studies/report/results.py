@@ -115,8 +115,8 @@ def refresh(ledger: Ledger, study: Study, references: References | None = None) 
     paths = [*(folder / chart.file for chart in study.charts), folder / f"{study.name}.csv"]
     paths += [ledger.root / summary.file for summary in SUMMARIES if summary.study == study.name]
     before = _stamped(ledger.root / "cache" / f"{study.name}.drawn.json")
-    drawn = before.get("inputs") == state and all(path.exists() for path in paths)
-    if drawn and read_part(ledger.root, study) is not None:
+    current = before.get("inputs") == state and all(path.exists() for path in paths)
+    if current and read_part(ledger.root, study) is not None:
         return paths, before["remarks"]
     return paths, draw(load(ledger, study, references or References(ledger)), state)
 
@@ -154,8 +154,8 @@ def draw(loaded: Loaded, state: str) -> list[str]:
     with svg_copies() as pictures:
         draw_charts(root, study, runs)
     write_part(root, study, runs, rows, pictures)
-    drawn = {"inputs": state, "remarks": loaded.remarks}
-    write_whole(root / "cache" / f"{study.name}.drawn.json", json.dumps(drawn).encode())
+    stamp = {"inputs": state, "remarks": loaded.remarks}
+    write_whole(root / "cache" / f"{study.name}.drawn.json", json.dumps(stamp).encode())
     return loaded.remarks
 
 
@@ -165,8 +165,8 @@ def _stamped(stamp: Path) -> dict[str, Any]:
         before = json.loads(stamp.read_bytes())
     except (OSError, ValueError, RecursionError):
         return {}
-    known = isinstance(before, dict) and isinstance(before.get("inputs"), str)
-    return before if known and isinstance(before.get("remarks"), list) else {}
+    valid = isinstance(before, dict) and isinstance(before.get("inputs"), str)
+    return before if valid and isinstance(before.get("remarks"), list) else {}
 
 
 def state_of_study(ledger: Ledger, study: Study) -> str:
@@ -175,8 +175,8 @@ def state_of_study(ledger: Ledger, study: Study) -> str:
     jobs, machine = case_jobs(ledger.root, study), shown_machine(ledger.root)
     others = [*(ledger.timing(job, machine) for job in jobs), *ledger.files(SUBMISSIONS).values()]
     metrics = [metric(column) for column in study.columns]
-    drawn = [entry.of for entry in metrics] + [chart.drawing for chart in study.charts]
-    own = {file.sha256 for file in map(file_of, drawn) if file is not None}
+    drawings = [entry.of for entry in metrics] + [chart.drawing for chart in study.charts]
+    own = {file.sha256 for file in map(file_of, drawings) if file is not None}
     names = [*(job.digest for job in jobs), *(entry.name for entry in metrics), *sorted(own), study.word]
     files = ledger.state([*jobs, *reference_jobs(ledger.root, study.scenes)])
     return state_of(files, *(entry.written if entry else "-" for entry in others), *names)

@@ -120,11 +120,11 @@ def organ_size(scene: Scene) -> float:
     return MARGIN * float(np.linalg.norm(np.ptp(surface_of(scene.organ, scene.name)[0], axis=0)))
 
 
-def solve_memory(solve: ReferenceSolve, known: int | None) -> float:
-    """Memory of a reference, rather too much [bytes]; known: unknowns of its last result, where there is one."""
+def solve_memory(solve: ReferenceSolve, last_unknowns: int | None) -> float:
+    """Memory of a reference, rather too much [bytes]; last_unknowns: those of its last result, where there is one."""
     plan = solve.scene.reference
     margin = MARGIN if plan is not None and plan.nested else 2.0  # nested meshes stop at a number, others end at a size
-    return MEMORY + factor_memory(known or margin * unknowns(solve))
+    return MEMORY + factor_memory(last_unknowns or margin * unknowns(solve))
 
 
 def factor_memory(unknowns: float) -> float:

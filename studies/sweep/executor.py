@@ -9,7 +9,7 @@ from studies.catalog.study import Study
 from studies.store.ledger import Ledger
 from studies.sweep.job import Job
 
-Told = Callable[[str], object]
+CompileListener = Callable[[str], object]
 """Called with the name of a function that is being compiled, from any thread."""
 
 
@@ -56,14 +56,14 @@ class Executor(Protocol):
         """Whether results are to be equal on every x86-64 processor (studies.base.portable)."""
         ...
 
-    def map(self, jobs: Sequence[Job], on_compile: Told) -> Generator[tuple[Job, str | None]]:
+    def map(self, jobs: Sequence[Job], on_compile: CompileListener) -> Generator[tuple[Job, str | None]]:
         """Does the jobs and yields each as it ends: with None, or with the cause where its process died in all tries.
 
         Raises StudyError before anything runs where a job cannot run, and what a job raises."""
         ...
 
     def measure(
-        self, ledger: Ledger, study: Study, progress: Progress, on_compile: Told, among: set[Path] | None
+        self, ledger: Ledger, study: Study, progress: Progress, on_compile: CompileListener, among: set[Path] | None
     ) -> int:
         """Times alone what is not timed yet of a study, of `among` (absolute paths) where given; how many that were."""
         ...
@@ -73,7 +73,7 @@ def perform(
     executor: Executor,
     jobs: Sequence[Job],
     progress: Progress,
-    on_compile: Told,
+    on_compile: CompileListener,
     on_death: Callable[[Job, str], object],
 ) -> None:
     """Does the jobs; `on_death` gets those whose process died, with the cause. Ctrl-C keeps what is stored."""

@@ -75,8 +75,8 @@ def known_studies(names: Sequence[str]) -> list[Study]:
 
 def find_studies(names: Sequence[str]) -> list[Study]:
     """The studies of so many names; the main ones of the catalogue for none, and for the name "main"."""
-    found = [[s for s in STUDIES if s.main] if name == MAIN else [find_study(name)] for name in names or [MAIN]]
-    return [study for group in found for study in group]
+    groups = [[s for s in STUDIES if s.main] if name == MAIN else [find_study(name)] for name in names or [MAIN]]
+    return [study for group in groups for study in group]
 
 
 def _check_stored(name: str, case: Case) -> None:

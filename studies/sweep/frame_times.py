@@ -10,11 +10,13 @@ from studies.metrics.timing.cases import time_cases
 from studies.runs.case import Case
 from studies.store.archived import check_no_archive
 from studies.store.ledger import Ledger
-from studies.sweep.executor import Progress, Told
+from studies.sweep.executor import CompileListener, Progress
 from studies.sweep.job import CaseJob, case_jobs
 
 
-def measure_times(ledger: Ledger, study: Study, progress: Progress, on_compile: Told, among: set[Path] | None) -> int:
+def measure_times(
+    ledger: Ledger, study: Study, progress: Progress, on_compile: CompileListener, among: set[Path] | None
+) -> int:
     """Times what is not timed yet, of `among` (absolute paths) where given, when no other command does; how many that
     were."""
 
@@ -26,7 +28,7 @@ def measure_times(ledger: Ledger, study: Study, progress: Progress, on_compile: 
     return _measured(ledger.root, study, progress, on_compile, pending)
 
 
-def measure_again(ledger: Ledger, study: Study, progress: Progress, on_compile: Told) -> int:
+def measure_again(ledger: Ledger, study: Study, progress: Progress, on_compile: CompileListener) -> int:
     """Times again on this machine all that is stored and current, and runs none of it; how many that were. Older times
     of a case stay until the newer ones are whole. Raises StudyError for a root that is an archive."""
     check_no_archive(ledger.root)
@@ -50,7 +52,9 @@ def timed_jobs(ledger: Ledger, study: Study) -> list[CaseJob]:
     return [job for job in case_jobs(ledger.root, study) if job.work.timed and ledger.can_be_timed(job)]
 
 
-def _measured(root: Path, study: Study, progress: Progress, on_compile: Told, pending: Callable[[], list[Case]]) -> int:
+def _measured(
+    root: Path, study: Study, progress: Progress, on_compile: CompileListener, pending: Callable[[], list[Case]]
+) -> int:
     if not pending():
         return 0
     with alone(root), watching(on_compile):

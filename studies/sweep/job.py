@@ -8,6 +8,8 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, ClassVar
 
+from numpy.linalg import LinAlgError
+
 from studies.base.atomic import is_there
 from studies.base.errors import StudyError
 from studies.catalog.study import Study
@@ -37,7 +39,7 @@ class Job(ABC):
     study: str
     """Name of the study, or of the folder of references."""
     work: Case | ReferenceSolve
-    seen: tuple[int, ...] | None = field(default=None, compare=False)
+    initial_state: tuple[int, ...] | None = field(default=None, compare=False)
     """State of its file when the sweep began; None where there was none."""
 
     kind: ClassVar[str]
@@ -105,7 +107,7 @@ class Job(ABC):
 
     def done_meanwhile(self) -> bool:
         """Whether another command has stored its result since the sweep began."""
-        if self.state() in (None, self.seen):
+        if self.state() in (None, self.initial_state):
             return False
         return why_entry_is_stale(read_entry(self.path()), self.digest, self.fingerprint) is None
 
@@ -183,8 +185,8 @@ class ReferenceJob(Job):
     def needs(self) -> float:
         if self._published:
             return MEMORY
-        known = read_entry(self.path()).unknowns if is_there(self.path()) else None
-        return solve_memory(self.work, known)
+        last_unknowns = read_entry(self.path()).unknowns if is_there(self.path()) else None
+        return solve_memory(self.work, last_unknowns)
 
     @property
     def seconds(self) -> float:
@@ -218,6 +220,8 @@ class ReferenceJob(Job):
             return solve(self.root, self.work)
         except StudyError as error:
             return self.store_failure(str(error))
+        except LinAlgError as error:  # of a small dense system: NumPy's word for a tangent without an inverse
+            return self.store_failure(f"the equations of the reference cannot be solved: {error}")
 
     def failure(self, cause: str) -> Record:
         work = self.work

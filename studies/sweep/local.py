@@ -15,7 +15,7 @@ from studies.catalog.study import Study
 from studies.geometry.mesher.jobs import cache_folder
 from studies.runs.user_code import Given, given_files, load_given
 from studies.store.ledger import Ledger
-from studies.sweep.executor import Progress, Told
+from studies.sweep.executor import CompileListener, Progress
 from studies.sweep.frame_times import measure_times
 from studies.sweep.job import CaseJob, Job, do
 
@@ -58,14 +58,14 @@ class Local:
     def __exit__(self, *error: object) -> None:
         """Its processes end with each sweep."""
 
-    def map(self, jobs: Sequence[Job], on_compile: Told) -> Generator[tuple[Job, str | None]]:
+    def map(self, jobs: Sequence[Job], on_compile: CompileListener) -> Generator[tuple[Job, str | None]]:
         """As every executor."""
         prepare = partial(begin, files_for(jobs))
         for ended in run_each(jobs, self.processes, do, prepare, environment(self.portable), on_compile):
             yield ended.job, ended.cause
 
     def measure(
-        self, ledger: Ledger, study: Study, progress: Progress, on_compile: Told, among: set[Path] | None
+        self, ledger: Ledger, study: Study, progress: Progress, on_compile: CompileListener, among: set[Path] | None
     ) -> int:
         """As every executor: in this process."""
         return measure_times(ledger, study, progress, on_compile, among)

@@ -46,15 +46,15 @@ def plan(ledger: Ledger, study: Study, wanted: Callable[[Job], bool] | None = No
     jobs = jobs_of(ledger.root, [study])
     chosen = [job for job in jobs if (ledger.why(job) is not None if wanted is None else wanted(job))]
     measured = rates(ledger, jobs) if chosen else {}
-    found = [_of_job(ledger, job, measured) for job in chosen]
+    pieces = [_of_job(ledger, job, measured) for job in chosen]
     runs = {job.label for job in chosen}
     for job in case_jobs(ledger.root, study):
         if not job.work.timed or (wanted is not None and job.label not in runs):
             continue
         why = ledger.why_untimed(job)
         if why is not None and (ledger.can_be_timed(job) or job.label in runs):
-            found.append(_of_timing(ledger, job, why, measured))
-    return found
+            pieces.append(_of_timing(ledger, job, why, measured))
+    return pieces
 
 
 def plan_again(ledger: Ledger, study: Study) -> list[Planned]:
@@ -102,18 +102,18 @@ def _cost(entry: Entry | None) -> tuple[float | None, int | None]:
     return (None, None) if entry is None or entry.fault else (entry.seconds, entry.size)
 
 
-def expected(found: Sequence[Planned], jobs: int) -> float:
-    """Seconds that `found` takes in `jobs` processes, timing alone: what each took, or would by its size."""
+def expected(pieces: Sequence[Planned], jobs: int) -> float:
+    """Seconds that `pieces` take in `jobs` processes, timing alone: what each took, or would by its size."""
     shared = {PHYSICS: jobs, TIMING: 1}
-    return sum((piece.guess if piece.seconds is None else piece.seconds) / shared[piece.stage] for piece in found)
+    return sum((piece.guess if piece.seconds is None else piece.seconds) / shared[piece.stage] for piece in pieces)
 
 
-def expected_bytes(found: Sequence[Planned]) -> tuple[int, int]:
-    """What `found` will store, and how many of it are not in that, because nothing is known of their size. A reference
-    counts as the mean of those that are known."""
-    sizes = [piece.size for piece in found if piece.size is not None]
-    references = [piece.size for piece in found if piece.kind == "reference" and piece.size is not None]
-    unknown = len(found) - len(sizes)
+def expected_bytes(pieces: Sequence[Planned]) -> tuple[int, int]:
+    """What `pieces` will store, and how many of them are not in that, because nothing is known of their size. A
+    reference counts as the mean of those that are known."""
+    sizes = [piece.size for piece in pieces if piece.size is not None]
+    references = [piece.size for piece in pieces if piece.kind == "reference" and piece.size is not None]
+    unknown = len(pieces) - len(sizes)
     if references:
         return sum(sizes) + unknown * sum(references) // len(references), 0
     return sum(sizes), unknown

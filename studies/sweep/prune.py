@@ -65,16 +65,16 @@ def prunable(
         folder = study_folder(ledger.root, name)
         named |= {folder / file: rule for file, rule in files.items()}
         named |= {part: Rule.ORPHANS for part in old_parts(folder)}
-    found = [_looked_at(path, rule) for path, rule in sorted(named.items()) if rule in rules]
-    return [one for one in found if one is not None and time.time() - one.modified >= older * DAY]
+    candidates = [_prunable(path, rule) for path, rule in sorted(named.items()) if rule in rules]
+    return [one for one in candidates if one is not None and time.time() - one.modified >= older * DAY]
 
 
-def remove(found: Collection[Prunable]) -> list[Prunable]:
+def remove(files: Collection[Prunable]) -> list[Prunable]:
     """Removes them; what another command has rewritten meanwhile stays. Those that are gone.
 
     Raises StudyError where a file cannot be removed."""
     gone = []
-    for one in found:
+    for one in files:
         try:
             if is_there(one.path) and file_state(one.path.lstat()) == one.state:
                 one.path.unlink()
@@ -86,46 +86,46 @@ def remove(found: Collection[Prunable]) -> list[Prunable]:
     return gone
 
 
-def _looked_at(path: Path, rule: Rule) -> Prunable | None:
+def _prunable(path: Path, rule: Rule) -> Prunable | None:
     """None where it is gone."""
     try:
-        found = path.lstat()
+        stat = path.lstat()
     except FileNotFoundError:
         return None
-    return Prunable(path, rule, found.st_size, found.st_mtime, file_state(found))
+    return Prunable(path, rule, stat.st_size, stat.st_mtime, file_state(stat))
 
 
 def _of_study(ledger: Ledger, study: Study) -> dict[str, Rule]:
     """By the name of a file in the study's folder: the rule that lets it go. Current results are not among them."""
     files, jobs = ledger.files(study.name), {job.path().name: job for job in case_jobs(ledger.root, study)}
-    found: dict[str, Rule] = {}
+    rules: dict[str, Rule] = {}
     for file in (name for name in files if TIMING not in name):
         rule = _rule(ledger, jobs[file]) if file in jobs else Rule.SUPERSEDED
         if rule is not None:
-            found[file] = rule
+            rules[file] = rule
         elif (timing := ledger.timing(jobs[file])) is not None and ledger.why_untimed(jobs[file]) is not None:
-            found[timing.file] = Rule.STALE
+            rules[timing.file] = Rule.STALE
     for timing in (name for name in files if TIMING in name):
         record = timing.split(TIMING)[0] + SUFFIX
         if record not in files:
-            found[timing] = Rule.ORPHANS
-        elif record in found:  # frame times go with their run
-            found[timing] = found[record]
-    return found
+            rules[timing] = Rule.ORPHANS
+        elif record in rules:  # frame times go with their run
+            rules[timing] = rules[record]
+    return rules
 
 
 def _of_references(ledger: Ledger, studies: Collection[Study]) -> dict[str, Rule]:
     """The same for the references of the scenes of studies; those of any other scene stay."""
     scenes = {scene.name for study in studies for scene in study.scenes}
     jobs = {job.path().name: job for study in studies for job in reference_jobs(ledger.root, study.scenes)}
-    found: dict[str, Rule] = {}
+    rules: dict[str, Rule] = {}
     for file, entry in ledger.files(REFERENCES).items():
         rule = _rule(ledger, jobs[file]) if file in jobs else None
         if rule is None and file not in jobs and entry.kind == "reference" and entry.scene in scenes:
             rule = Rule.SUPERSEDED
         if rule is not None:
-            found[file] = rule
-    return found
+            rules[file] = rule
+    return rules
 
 
 def _rule(ledger: Ledger, job: Job) -> Rule | None:

@@ -8,7 +8,7 @@ from studies.base.atomic import write_whole
 from studies.catalog.study import Study
 from studies.store.archived import check_no_archive
 from studies.store.ledger import Ledger
-from studies.sweep.executor import Executor, Progress, Told, perform
+from studies.sweep.executor import CompileListener, Executor, Progress, perform
 from studies.sweep.failures import Failures
 from studies.sweep.job import Job, jobs_of
 from studies.sweep.local import Local
@@ -20,7 +20,7 @@ def run_studies(
     jobs: int | Executor,
     progress: Progress,
     wanted: Callable[[Job], bool] | None = None,
-    on_compile: Told = lambda name: None,
+    on_compile: CompileListener = lambda name: None,
     failures: Failures | None = None,
     ledger: Ledger | None = None,
 ) -> int:
@@ -43,7 +43,7 @@ def run_studies(
     rule = wanted or stale
     ledger.look_again()
     stored = [(job, ledger.entry(job)) for job in jobs_of(root, studies) if rule(job)]
-    todo = [replace(job, seen=entry and entry.state) for job, entry in stored]
+    todo = [replace(job, initial_state=entry and entry.state) for job, entry in stored]
     failures = failures or Failures()
     if todo:
         check_writable(root)

@@ -59,14 +59,14 @@ def warnings_of(ledger: Ledger, study: Study) -> list[str]:
     return [entry.warnings for entry in entries if entry is not None and entry.warnings]
 
 
-def summary(found: Sequence[Standing]) -> str:
+def summary(job_standings: Sequence[Standing]) -> str:
     """ "9 cases: 7 ok, 2 failed; 6 reference solutions: 6 ok"."""
-    groups = {kind: [s.status for s in found if s.job.kind == kind] for kind in ("case", "reference")}
+    groups = {kind: [s.status for s in job_standings if s.job.kind == kind] for kind in ("case", "reference")}
     parts = [f"{amounts(Counter({kind: len(each)}))}: {status_counts(each)}" for kind, each in groups.items() if each]
     return "; ".join(parts) or "no cases"
 
 
-def unexpected(study: Study, found: Sequence[Standing]) -> list[Standing]:
+def unexpected(study: Study, job_standings: Sequence[Standing]) -> list[Standing]:
     """What ended in a way that the study does not expect."""
 
     def expected(standing: Standing) -> bool:
@@ -74,14 +74,14 @@ def unexpected(study: Study, found: Sequence[Standing]) -> list[Standing]:
             return standing.status == Status.OK or study.counts_losses
         return study.accepts(standing.status)
 
-    odd = [standing for standing in found if standing.ended and not expected(standing)]
+    odd = [standing for standing in job_standings if standing.ended and not expected(standing)]
     return sorted(odd, key=lambda standing: standing.job.kind)
 
 
-def causes(found: Sequence[Standing]) -> list[str]:
+def causes(job_standings: Sequence[Standing]) -> list[str]:
     """A sentence for each distinct cause, with the first label; messages that differ in numbers alone are one."""
     groups: dict[tuple[str, str], list[Standing]] = {}
-    for standing in found:
+    for standing in job_standings:
         kind = "".join(letter for letter in standing.message if letter not in "0123456789.e+-")
         groups.setdefault((standing.status, kind), []).append(standing)
     sentences = []
@@ -92,9 +92,9 @@ def causes(found: Sequence[Standing]) -> list[str]:
     return [*sentences, f"and {left} more causes; `organbench status` names them"] if left > 0 else sentences
 
 
-def machines_of(found: Iterable[Standing]) -> Counter[str]:
+def machines_of(job_standings: Iterable[Standing]) -> Counter[str]:
     """Results of each kind of machine, by its id, the most first; stale and missing ones left out."""
-    ended = (standing.entry for standing in found if standing.ended and standing.entry is not None)
+    ended = (standing.entry for standing in job_standings if standing.ended and standing.entry is not None)
     counts = Counter(entry.machine if entry.portable is None else ANY for entry in ended)
     return Counter(dict(counts.most_common()))
 

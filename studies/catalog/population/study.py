@@ -14,11 +14,11 @@ from studies.scene.scene import Scene
 POPULATION = "population"
 """The study that `organbench run population` brings up to date."""
 MEMBERS = (
-    Population("liver", 24),
-    Population("kidney", 16),
-    Population("stomach", 12),
-    Population("spleen", 6),
-    Population("bladder", 8),
+    Population("liver", 27),
+    Population("kidney", 27),
+    Population("stomach", 27),
+    Population("spleen", 30),
+    Population("bladder", 30),
 )
 NODES = 550
 """Surface nodes of the linear bodies, of a hollow organ as many again on its lumen."""
@@ -72,6 +72,7 @@ def population_study(populations: Sequence[Population] = MEMBERS, name: str = PO
             "interior_error",
             "volume_worst",
             "min_j",
+            "real_time",
             "sway",
         ),
     )

@@ -30,7 +30,7 @@ def advise(
     Without --force and --displacement: force within 3 %, displacement within 1 %; hollow organs 6 % and 3 %.
     """
     bounds = share(force, "force"), share(displacement, "displacement"), in_time(budget)
-    with compiling(errors, "timing") as told, watching(told):
-        found = answered(find_scene(scene), *bounds, results=results, timing=timing)
-    for line in lines_of(found):
+    with compiling(errors, "timing") as report, watching(report):
+        advice = answered(find_scene(scene), *bounds, results=results, timing=timing)
+    for line in lines_of(advice):
         say(line)

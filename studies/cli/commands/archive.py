@@ -29,9 +29,9 @@ def archive(
             count = check(checked)
         say(f"{checked}: {count} files, each as it was packed")
         return
-    found = find_studies(studies) if studies else chosen(results, STUDIES)
+    chosen_studies = find_studies(studies) if studies else chosen(results, STUDIES)
     files = [Path(name) for name in studies or [] if name.endswith(".py")]
-    with busy(f"packing {', '.join(study.name for study in found)}"):
-        packed = pack(results, found, output, datetime.now(UTC).date().isoformat(), files)
+    with busy(f"packing {', '.join(study.name for study in chosen_studies)}"):
+        packed = pack(results, chosen_studies, output, datetime.now(UTC).date().isoformat(), files)
     warn(packed.remarks)
     say(f"{packed.path}: {packed.files} files, {packed.size / 1e6:.1f} MB")

@@ -43,9 +43,9 @@ def calibrate(
     folds_of(organ)
     kind = lookup(body, (*KINDS, BOTH), "body")
     for start in [starting_recipe(organ, each, nodes) for each in (KINDS if kind == BOTH else (kind,))]:
-        found = _calibrated(organ, start, results, jobs)
-        _tell(found)
-        say(f"stored in {calibration_path(results, found)}")
+        calibration = _calibrated(organ, start, results, jobs)
+        _tell(calibration)
+        say(f"stored in {calibration_path(results, calibration)}")
 
 
 def _calibrated(organ: str, start: BodyRecipe, results: Path, jobs: int) -> Calibration:
@@ -53,6 +53,6 @@ def _calibrated(organ: str, start: BodyRecipe, results: Path, jobs: int) -> Cali
         return calibrated_on(organ, start, results, jobs, progress, progress.compiling)
 
 
-def _tell(found: Calibration) -> None:
-    for line in lines_of(found):
+def _tell(calibration: Calibration) -> None:
+    for line in lines_of(calibration):
         say(line)

@@ -55,6 +55,6 @@ def line(run: Run, words: str, speed: float) -> str:
     reference = run.reference
     if reference is None:
         raise StudyError(f"the scene '{run.case.scene.name}' has no reference: `organbench status demo` says why")
-    known = 100 * reference.total_uncertainty["force_end"]
-    numbers = f"volume {volume_worst(run):.2g} % off, force {force_end(run):+.1f} ± {known:.1f} %"
+    uncertainty = 100 * reference.total_uncertainty["force_end"]
+    numbers = f"volume {volume_worst(run):.2g} % off, force {force_end(run):+.1f} ± {uncertainty:.1f} %"
     return f"{words}: {numbers}, {speed:.1f} times real time"

@@ -16,11 +16,11 @@ def doctor(results: Results = Path("results")) -> None:
     """Check this installation, its caches and its results. Exit code 1: something needed is missing."""
     with busy("looking at packages, caches and results"):
         names = [name for name, _ in outline.studies()]
-        found = [*software(), *machine(results), *results_folder(results, names)]
-    for finding in found:
+        findings = [*software(), *machine(results), *results_folder(results, names)]
+    for finding in findings:
         show(finding)
-    faults = sum(finding.level is Level.FAULT for finding in found)
-    say(f"{faults} of {len(found)} checks failed" if faults else "nothing required is missing")
+    faults = sum(finding.level is Level.FAULT for finding in findings)
+    say(f"{faults} of {len(findings)} checks failed" if faults else "nothing required is missing")
     raise typer.Exit(1 if faults else 0)
 
 

@@ -26,15 +26,15 @@ def export(
 
     README.md in the folder holds what our own bodies reach.
     """
-    found = find_scene(scene)
-    folder = output if output is not None else Path(found.name)
+    chosen_scene = find_scene(scene)
+    folder = output if output is not None else Path(chosen_scene.name)
     try:
-        rows = yardsticks(results, found)
+        rows = yardsticks(results, chosen_scene)
     except StudyError as problem:
         warn([f"README.md names no measured body: {problem}"])
         rows = []
-    with busy(f"meshing for {found.name}"):
-        written, why_not = exported(found, folder, nodes, rows)
+    with busy(f"meshing for {chosen_scene.name}"):
+        written, why_not = exported(chosen_scene, folder, nodes, rows)
     if why_not:
         warn([f"there is no curved mesh: {why_not}"])
     for path in written:

@@ -50,40 +50,40 @@ def fuzz(
     campaign = REFERENCE if reference else CUTS if cuts else FOLDER
     make, attempt = CAMPAIGNS[campaign]
     if trial is not None:
-        found = [attempt(make(seed, trial))]
-        tell(found[0])
-        say(f"simplest: {simplest(found[0], attempt=attempt).trial.changed}")
+        outcomes = [attempt(make(seed, trial))]
+        tell(outcomes[0])
+        say(f"simplest: {simplest(outcomes[0], attempt=attempt).trial.changed}")
     else:
         with TerminalProgress(errors) as progress:
             progress.begin(WHAT, cases)
             trials = [make(seed, number) for number in range(cases)]
-            found = run_trials(trials, jobs, lambda outcome: progress.advance(WHAT, outcome.status), attempt)
-        {FOLDER: store, REFERENCE: store_reference, CUTS: store_cuts}[campaign](results, found)
-        for outcome in found:
+            outcomes = run_trials(trials, jobs, lambda outcome: progress.advance(WHAT, outcome.status), attempt)
+        {FOLDER: store, REFERENCE: store_reference, CUTS: store_cuts}[campaign](results, outcomes)
+        for outcome in outcomes:
             if outcome.status == UNEXPLAINED:
                 tell(outcome)
-    if any(outcome.status == UNEXPLAINED for outcome in found):
+    if any(outcome.status == UNEXPLAINED for outcome in outcomes):
         raise typer.Exit(1)
 
 
-def store(results: Path, found: Sequence[Outcome]) -> None:
+def store(results: Path, outcomes: Sequence[Outcome]) -> None:
     """The table, counts and chart of a campaign against the methods."""
-    table = table_of(found)
+    table = table_of(outcomes)
     draw_chart(table, results / FOLDER / "breaking.png")
     write(results, FOLDER, table, counts(table).reset_index())
 
 
-def store_reference(results: Path, found: Sequence[Outcome]) -> None:
+def store_reference(results: Path, outcomes: Sequence[Outcome]) -> None:
     """The same against the reference, without a chart, and the last states that converged before a failure."""
-    table = table_of(found)
-    write_whole(results / REFERENCE / LAST, last_states(found))
+    table = table_of(outcomes)
+    write_whole(results / REFERENCE / LAST, last_states(outcomes))
     write(results, REFERENCE, table, counts_by_choice(table))
 
 
-def store_cuts(results: Path, found: Sequence[Outcome]) -> None:
+def store_cuts(results: Path, outcomes: Sequence[Outcome]) -> None:
     """The same of cuts, counted by kind."""
-    kinds = [outcome.trial.kind for outcome in found if isinstance(outcome.trial, CutTrial)]
-    table = table_of(found).assign(kind=kinds)
+    kinds = [outcome.trial.kind for outcome in outcomes if isinstance(outcome.trial, CutTrial)]
+    table = table_of(outcomes).assign(kind=kinds)
     write(results, CUTS, table, counts(table, "kind").reset_index())
 
 

@@ -47,14 +47,14 @@ def judge(
         if name or force is not None or seconds is not None:
             raise StudyError(f"{file.name} says all about the entry itself; leave out --name, --force and --seconds")
         check_entry(entry, scene)
-    found = find_scene(scene)
+    chosen_scene = find_scene(scene)
     with busy(f"judging {file.name}"):
         if entry is None:
-            record = entry_record(found, file, name or file.stem, nodes, force, seconds)
+            record = entry_record(chosen_scene, file, name or file.stem, nodes, force, seconds)
         else:
-            check_mesh_here(entry, found)
-            record = judged_file(found, entry, file.parent)
-        run = run_of_entry(record, reference_of(results, found))
+            check_mesh_here(entry, chosen_scene)
+            record = judged_file(chosen_scene, entry, file.parent)
+        run = run_of_entry(record, reference_of(results, chosen_scene))
     path = entry_path(results if entry is None else results / FOLDER, run.case)
     replaced = path.is_file()
     write_record(path, record)
@@ -66,7 +66,7 @@ def judge(
     warn(hints_of(run))
     if replaced:
         warn([f"it replaces an entry named {run.case.method.name} on the same mesh"])
-    beside = [study.name for study in STUDIES if found.name in [each.name for each in study.scenes]]
+    beside = [study.name for study in STUDIES if chosen_scene.name in [each.name for each in study.scenes]]
     command = "report" if entry is not None else f"table {beside[-1]}" if beside else ""
     shown = f", shown next to our methods by `organbench {command}`" if command else ""
     say(f"stored in {path}{shown}")

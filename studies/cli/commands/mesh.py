@@ -79,8 +79,8 @@ def mesh(
     if source is None:
         say(closeness(made, Organ(name, made.mesh.recipe["parameters"]), make))
     elif nodes:
-        known = file if file.longest_side is not None else replace(file, unit=made.mesh.recipe["unit"])
-        say(closeness(made, Organ("file", organ_options(known, how)), make))
+        sized_file = file if file.longest_side is not None else replace(file, unit=made.mesh.recipe["unit"])
+        say(closeness(made, Organ("file", organ_options(sized_file, how)), make))
     say(f"{summary(made)}; written to {output} in {NAMES[write_unit]}")
 
 
@@ -135,7 +135,7 @@ def synthetic(name: str, nodes: int, seed: int | None, wall: float | None, fille
     lookup(name, SHAPES, "organ")
     parameters: dict[str, float] = {} if seed is None else dict(vary(name, seed))
     if wall is not None:
-        hollow = [known for known, make in SHAPES.items() if "wall" in make.__code__.co_varnames]
+        hollow = [shape for shape, make in SHAPES.items() if "wall" in make.__code__.co_varnames]
         if name not in hollow:
             raise StudyError(f"the {name} is solid; --wall is for {', '.join(hollow)}, or for a file (--from)")
         # The ball's parameters are in metres, the organs' in millimetres.
@@ -147,9 +147,9 @@ def closeness(made: Made, truth: Organ, make: Callable[[int | None], Made]) -> s
     """How far a mesh is from its true surface, and where that is too far, how many nodes are not: `make` meshes that
     number."""
     errors, count = errors_of(made, truth), made.mesh.outer_count
-    told, bounds = f"shape: {errors}", f"within {SHAPE:g} % and {SHAPE_VOLUME:g} %"
+    sentence, bounds = f"shape: {errors}", f"within {SHAPE:g} % and {SHAPE_VOLUME:g} %"
     if not errors.worst > 1.0:
-        return told
+        return sentence
     with working("looking for the number of nodes that keeps the shape"), warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)  # of meshes that nobody asked for
         for _ in range(TRIES):
@@ -159,8 +159,8 @@ def closeness(made: Made, truth: Organ, make: Callable[[int | None], Made]) -> s
             except StudyError:
                 continue  # Not lost: more nodes follow.
             if errors.worst <= 1.0:
-                return f"{told}; {count:,} nodes keep it {bounds}"
-    return f"{told}; {count:,} nodes do not keep it {bounds} either"
+                return f"{sentence}; {count:,} nodes keep it {bounds}"
+    return f"{sentence}; {count:,} nodes do not keep it {bounds} either"
 
 
 TRIES = 4

@@ -31,32 +31,32 @@ def mesh_check(
     source = source_of(path, unit, scale, longest_side, part)
     ask_before_large(path, yes)
     with working(f"examining {path.name}"):
-        found = examine(source, tissue=(modulus, density))
+        report = examine(source, tissue=(modulus, density))
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # the file is read again
-            found = tried(source, found)
+            report = tried(source, report)
     if as_json:
-        print(json.dumps(found.to_dict(), indent=2, allow_nan=False))
+        print(json.dumps(report.to_dict(), indent=2, allow_nan=False))
     else:
-        show(found)
-    raise typer.Exit(0 if found.clean else 1)
+        show(report)
+    raise typer.Exit(0 if report.clean else 1)
 
 
-def show(found: Findings) -> None:
+def show(report: Findings) -> None:
     """The findings and the numbers behind them, for a person."""
-    table = Table(show_header=False, box=None, title=found.name, title_justify="left")
-    for key, value in rows_of(found.measures):
+    table = Table(show_header=False, box=None, title=report.name, title_justify="left")
+    for key, value in rows_of(report.measures):
         table.add_row(key, value)
     console.print(table)
-    if len(found.measures["part_list"]) > 1:
-        console.print(parts_table(found.measures["part_list"]))
-    for number, finding in enumerate(found.findings, start=1):
+    if len(report.measures["part_list"]) > 1:
+        console.print(parts_table(report.measures["part_list"]))
+    for number, finding in enumerate(report.findings, start=1):
         console.print(f"{number}. {finding.sentence}", markup=False, highlight=False)
         console.print(f"   -> {finding.mend}", markup=False, highlight=False)
-    if found.command:
+    if report.command:
         console.print(f"tested; this gives a clean body of {NODES} surface nodes:", highlight=False)
-        console.print(found.command, markup=False, highlight=False, soft_wrap=True)
-    if found.clean:
+        console.print(report.command, markup=False, highlight=False, soft_wrap=True)
+    if report.clean:
         console.print("no faults found")
 
 

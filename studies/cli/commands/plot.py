@@ -14,12 +14,12 @@ from studies.sweep.find_study import find_study
 
 def plot(study: StudyName, results: Results = Path("results")) -> None:
     """Draw the charts and the table of a study. Nothing runs; the files are named."""
-    found = find_study(study)
-    check_columns(found.columns)
-    own = any(case_path(results, found.name, case).is_file() for case in found.cases)
+    chosen_study = find_study(study)
+    check_columns(chosen_study.columns)
+    own = any(case_path(results, chosen_study.name, case).is_file() for case in chosen_study.cases)
     if not own and not entry_files(results):
         raise StudyError(f"nothing of {study} is stored in {results}; run `organbench run {study}` first")
-    paths, remarks = refresh(Ledger(results), found)
+    paths, remarks = refresh(Ledger(results), chosen_study)
     warn(remarks)
     for path in paths:
         say(path)

@@ -28,25 +28,25 @@ def profile(
     """Measure the stages of a time step in microseconds, and what the scene leaves out. One pinned core."""
     case = chosen_case(scene, method, body, nodes)
     with compiling(errors, "measuring") as report, watching(report):
-        found = cost_table(case)
+        costs = cost_table(case)
     if csv is not None:
-        write_table(csv, found)
+        write_table(csv, costs)
     if json:
-        console.print(found.to_json(orient="records", force_ascii=False), markup=False, highlight=False)
+        console.print(costs.to_json(orient="records", force_ascii=False), markup=False, highlight=False)
         return
-    turns = found.attrs["turns"]
+    turns = costs.attrs["turns"]
     console.print(f"{case.name}, over the whole scene, fastest of {turns}", markup=False, highlight=False)
-    console.print(_drawn(found))
-    for what, remark in found[["what", "how much"]].itertuples(index=False):
+    console.print(_drawn(costs))
+    for what, remark in costs[["what", "how much"]].itertuples(index=False):
         if remark:
             console.print(f"{what}: {remark}", markup=False, highlight=False)
 
 
-def _drawn(found: pd.DataFrame) -> Table:
+def _drawn(costs: pd.DataFrame) -> Table:
     table = Table(box=None, pad_edge=False)
     for heading, side in (("", "left"), ("µs per step", "right"), ("share", "right")):
         table.add_column(heading, justify=side)  # type: ignore[arg-type]
-    for kind, rows in found.groupby("kind", sort=False):
+    for kind, rows in costs.groupby("kind", sort=False):
         table.add_row(HEADINGS[str(kind)], "", "", style="bold")
         for what, cost, share in rows[["what", "µs per step", "share of the step"]].itertuples(index=False):
             table.add_row(f"  {what}", f"{cost:.2f}", f"{100 * share:.1f} %")

@@ -32,38 +32,38 @@ def prune(
         raise StudyError("name the studies whose files are examined, or give --all")
     if yes and not rules:
         raise StudyError("--yes removes nothing without --rule: name the rules to apply")
-    known = {str(rule): rule for rule in Rule}
-    chosen = [lookup(word.strip(), known, "rule") for word in rules.split(",")] if rules else list(Rule)
+    rules_by_name = {str(rule): rule for rule in Rule}
+    chosen = [lookup(word.strip(), rules_by_name, "rule") for word in rules.split(",")] if rules else list(Rule)
     chosen_studies = list(STUDIES) if every else find_studies(studies or [])
-    found = prunable(Ledger(results), chosen_studies, chosen, older, references)
+    removable = prunable(Ledger(results), chosen_studies, chosen, older, references)
     for rule in chosen:
-        show([one for one in found if one.rule == rule], rule, listed)
-    if not found:
+        show([one for one in removable if one.rule == rule], rule, listed)
+    if not removable:
         say("nothing to remove")
     elif yes:
-        gone = remove(found)
-        say(f"removed {len(gone)} files, {size(gone)}" + _left(found, gone))
+        gone = remove(removable)
+        say(f"removed {len(gone)} files, {size(gone)}" + _left(removable, gone))
     else:
-        say(f"dry run: {size(found)} could be removed. Repeat with --rule RULE --yes to delete")
+        say(f"dry run: {size(removable)} could be removed. Repeat with --rule RULE --yes to delete")
 
 
-def show(found: list[Prunable], rule: Rule, listed: bool) -> None:
+def show(files: list[Prunable], rule: Rule, listed: bool) -> None:
     """The files of a rule, with what it means."""
-    if not found:
+    if not files:
         return
-    say(f"{rule}, {MEANING[rule]}: {len(found)} files, {size(found)}")
-    shown = found if listed or len(found) <= SHOWN + 1 else found[:SHOWN]
+    say(f"{rule}, {MEANING[rule]}: {len(files)} files, {size(files)}")
+    shown = files if listed or len(files) <= SHOWN + 1 else files[:SHOWN]
     for one in shown:
         say(f"  {one.path}")
-    if len(shown) < len(found):
-        say(f"  and {len(found) - len(shown)} more (--list names them)")
+    if len(shown) < len(files):
+        say(f"  and {len(files) - len(shown)} more (--list names them)")
 
 
-def size(found: list[Prunable]) -> str:
+def size(files: list[Prunable]) -> str:
     """Of all together, in MB."""
-    return f"{sum(one.size for one in found) / 1e6:.1f} MB"
+    return f"{sum(one.size for one in files) / 1e6:.1f} MB"
 
 
-def _left(found: list[Prunable], gone: list[Prunable]) -> str:
-    left = len(found) - len(gone)
+def _left(files: list[Prunable], gone: list[Prunable]) -> str:
+    left = len(files) - len(gone)
     return f"; {left} were rewritten in the meantime and stay" if left else ""

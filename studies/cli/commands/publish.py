@@ -43,8 +43,8 @@ def publish(
 def check_published(names: list[str]) -> None:
     """Says of all that is published, or of these names, whether the present code would make it. Exit code 1: something
     is not current."""
-    found = publishing.check(Path("."), [*STUDIES, find_study(POPULATION)])
-    shown = [one for one in found if not names or one.name in names]
+    findings = publishing.check(Path("."), [*STUDIES, find_study(POPULATION)])
+    shown = [one for one in findings if not names or one.name in names]
     for one in shown:
         say(f"{one.name}: {one.status}" + (f", {one.words}" if one.words else ""))
     behind = [one for one in shown if one.status != CURRENT]

@@ -144,7 +144,7 @@ def _bring_up_to_date(
     say(f"{study.name}: {summary(ended)}")
     for sentence in causes(odd):
         say(f"  {sentence}")
-    if study.name not in {known.name for known in STUDIES}:
+    if study.name not in {each.name for each in STUDIES}:
         _say_trust(root, study)
     return not odd
 

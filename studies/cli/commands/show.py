@@ -109,21 +109,21 @@ def _number(value: object) -> str:
 
 
 def _links(file: h5py.File) -> dict[str, str]:
-    found: dict[str, str] = {}
+    links: dict[str, str] = {}
 
     def note(name: str, link: h5py.HardLink | h5py.SoftLink | h5py.ExternalLink) -> None:
         if isinstance(link, h5py.ExternalLink):
-            found[name] = link.filename
+            links[name] = link.filename
 
     file.visititems_links(note)
-    return found
+    return links
 
 
 def _index(path: Path, links: dict[str, str], every: bool) -> Tree:
     records = "reference" if path.stem == REFERENCES else "case"
     kinds = Counter("timing" if TIMING in file else records for file in links.values())
     tree = Tree(Text.assemble((path.stem, "bold"), f"  (index of {amounts(kinds)}, {path})"))
-    known, branches = _entries(path), {"": tree}
+    entries, branches = _entries(path), {"": tree}
     leaves = Counter[str]()
     for name in sorted(links):
         *folders, leaf = name.split("/")
@@ -134,7 +134,7 @@ def _index(path: Path, links: dict[str, str], every: bool) -> Tree:
         place = "/".join(folders)
         leaves[place] += 1
         if every or leaves[place] <= LEAVES:
-            entry = known.get(links[name]) or read_entry(path.parent / links[name])
+            entry = entries.get(links[name]) or read_entry(path.parent / links[name])
             branches[place].add(Text.assemble(leaf + "  ", _brief(entry)))
     for place, count in leaves.items():
         if not every and count > LEAVES:

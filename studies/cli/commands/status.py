@@ -39,20 +39,20 @@ def status(
     ledger = Ledger(results, check)
     for entry in chosen:
         with busy(f"checking {entry.name}"):
-            found = standings(ledger, entry)
-        say(f"{entry.name}: {summary(found)}")
+            job_standings = standings(ledger, entry)
+        say(f"{entry.name}: {summary(job_standings)}")
         if study:
-            show_reasons(found, every)
-            mixed = mixture(machines_of(found))
+            show_reasons(job_standings, every)
+            mixed = mixture(machines_of(job_standings))
             if mixed:
                 say(f"  {mixed}")
     show_references(ledger, {scene.name: scene for entry in chosen for scene in entry.scenes}.values())
 
 
-def show_reasons(found: list[Standing], every: bool) -> None:
+def show_reasons(job_standings: list[Standing], every: bool) -> None:
     """What is not ok: each reason once, and under it the cases and reference solutions."""
     reasons: dict[tuple[str, str], list[str]] = {}
-    for standing in found:
+    for standing in job_standings:
         if standing.status != "ok":
             reasons.setdefault((standing.status, standing.message), []).append(standing.job.label)
     for (word, message), labels in reasons.items():

@@ -37,8 +37,8 @@ def table(
     """Print one row per case with the metrics of a study. ± is the uncertainty of the reference."""
     entry = find_study(study)
     own = [metric_of(column) for column in entry.columns]
-    known = {m.name: m for m in (*METRICS, *own)}
-    chosen = [lookup(name.strip(), known, "metric") for name in metrics.split(",")] if metrics else own
+    metrics_by_name = {m.name: m for m in (*METRICS, *own)}
+    chosen = [lookup(name.strip(), metrics_by_name, "metric") for name in metrics.split(",")] if metrics else own
     references = References(Ledger(results))
     rows, remarks = table_rows(references, entry, chosen)
     entries, unreadable = entries_beside(results, entry.scenes, references.of)
@@ -131,10 +131,10 @@ class Layout:
         texts = [column.filled(height, str.ljust) for column in self.labels]
         texts += [column.filled(height, str.rjust) for column in columns]
         lines = ["  ".join(line).rstrip() for line in zip(*texts, strict=True)]
-        found = lines[:height]
+        block = lines[:height]
         for name, numbers in self.groups.items():
-            found += [self.heading(name), *(lines[height + number] for number in numbers)]
-        return found
+            block += [self.heading(name), *(lines[height + number] for number in numbers)]
+        return block
 
 
 def head(metric: Metric) -> list[str]:
@@ -144,8 +144,8 @@ def head(metric: Metric) -> list[str]:
 
 def values(rows: Sequence[Row], key: str) -> set[str]:
     """What a setting is in the rows, as it is printed."""
-    found = {row[key]: row for row in rows}
-    return {setting(row, key) for row in found.values()}
+    rows_by_value = {row[key]: row for row in rows}
+    return {setting(row, key) for row in rows_by_value.values()}
 
 
 def setting(row: Row, key: str) -> str:
@@ -158,8 +158,8 @@ def setting(row: Row, key: str) -> str:
 
 def cell(row: Row, metric: Metric) -> str:
     """A metric of a row with its uncertainty; a volume is compared with the body's own, which is known."""
-    known = metric.quantity is not None and metric.quantity not in ALWAYS
-    uncertainty = float(row.get(f"{metric.name} floor [{metric.unit}]", "nan")) if known else float("nan")
+    has_floor = metric.quantity is not None and metric.quantity not in ALWAYS
+    uncertainty = float(row.get(f"{metric.name} floor [{metric.unit}]", "nan")) if has_floor else float("nan")
     unresolved = metric.name in str(row[UNRESOLVED]).split()
     return value_cell(
         float(row[f"{metric.name} [{metric.unit}]"]), uncertainty, signed=metric.better == "-", unresolved=unresolved

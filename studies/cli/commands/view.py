@@ -35,11 +35,11 @@ def view(
         check_target(output)
     own = {name: find_scene(name) for name in names if split_word(name)[0]}
     with busy(f"reading {' '.join(names)}"):
-        found = viewed(results, [own[name].name if name in own else name for name in names], list(own.values()))
-    warn(found.remarks)
-    path = output if output is not None else Path(found.scene.name + SUFFIX)
-    size = write_grid(path, side_by_side(found.times, found.bodies))
-    times = " ".join(f"{t:g}" for t in found.times)
-    say(f"{path}: {counted(len(found.bodies), 'body', 'bodies')} at {times} s, {size / 1e6:.1f} MB")
-    for number, body in enumerate(found.bodies):
+        scene_view = viewed(results, [own[name].name if name in own else name for name in names], list(own.values()))
+    warn(scene_view.remarks)
+    path = output if output is not None else Path(scene_view.scene.name + SUFFIX)
+    size = write_grid(path, side_by_side(scene_view.times, scene_view.bodies))
+    times = " ".join(f"{t:g}" for t in scene_view.times)
+    say(f"{path}: {counted(len(scene_view.bodies), 'body', 'bodies')} at {times} s, {size / 1e6:.1f} MB")
+    for number, body in enumerate(scene_view.bodies):
         say(f"  {number}  {body.name}")

@@ -124,7 +124,7 @@ def front(runs: Sequence[Run]) -> Figure:
         log_axis(panel.yaxis)
     for row, name in zip(axes, SHOWN, strict=True):
         bounds = [bound for group in found if (bound := group.of(metric(name)).bound) == bound]
-        row[0].set_ylim(min(bounds) / 3.0, 3.0 * max(bounds))
+        row[0].set_ylim(min(bounds) / 3.0, 6.0 * max(bounds))  # labels stand above the points
     for panel in axes[-1]:
         panel.set_xlabel("computing time / simulated time [s/s]")
     axes[-1, 0].set_xlim(min(costs.values()) / 2.0, 2.0 * max(1.0, *costs.values()))
@@ -146,7 +146,6 @@ def _draw_front(panel: Axes, bodies: Sequence[tuple[float, Group]], entry: Metri
     """The points of one panel; a handle for each kind of body."""
     wish = usual_wish(bodies[0][1].runs[0].case.scene)
     bound = wish.force if entry.name == "force_end" else wish.displacement
-    panel.axvline(1.0, color=GREY, linewidth=1.2)
     handles = {}
     for cost, group in bodies:
         error, look = group.of(entry), family_of(group.runs[0].case)
@@ -155,14 +154,16 @@ def _draw_front(panel: Axes, bodies: Sequence[tuple[float, Group]], entry: Metri
         low, high = (abs(end - error.bound) for end in error.bound_interval)
         bar = [[low], [high]] if low == low else None
         panel.errorbar(cost, error.bound, yerr=bar, marker=look.marker, color=look.colour, capsize=2, linestyle="none")
-        nodes = str(group.runs[0].case.body.nodes)
+        nodes, top = str(group.runs[0].case.body.nodes), error.bound_interval[1] if bar else error.bound
         panel.annotate(
-            nodes, (cost, error.bound), (2, 5), textcoords="offset points", size=SMALL, color=GREY, rotation=60
+            nodes, (cost, top), (0, 5), textcoords="offset points", size=SMALL, color=GREY, rotation=90, ha="center"
         )
         handles[look.name] = Line2D([], [], marker=look.marker, color=look.colour, linestyle="none", label=look.name)
     if not handles:
         remark(panel, NO_FORCE)
-    elif bound is not None:
+        return handles
+    panel.axvline(1.0, color=GREY, linewidth=1.2)
+    if bound is not None:
         panel.fill_between([1e-9, 1.0], 1e-12, bound, color=GREEN, alpha=0.12, linewidth=0)
     return handles
 

@@ -59,12 +59,12 @@ def _compare(path: Path, opened: Opener) -> int:
     for name, expected in _entries(path, opened):
         try:
             with opened(name) as file:
-                found = hashlib.file_digest(file, "sha256").hexdigest()  # pyright: ignore[reportArgumentType]
+                checksum = hashlib.file_digest(file, "sha256").hexdigest()  # pyright: ignore[reportArgumentType]
         except (KeyError, FileNotFoundError) as problem:
             raise DamagedFile(f"{path} lacks {name}: {AGAIN}") from problem
         except (zipfile.BadZipFile, zlib.error, EOFError, OSError) as problem:
             raise DamagedFile(f"{path}: {name} cannot be read ({problem}): {AGAIN}") from problem
-        if found != expected:
+        if checksum != expected:
             raise DamagedFile(f"{path}: {name} has changed since it was packed: {AGAIN}")
         count += 1
     return count

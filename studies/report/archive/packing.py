@@ -62,10 +62,10 @@ class Packed:
 
 def chosen(root: Path, catalogue: Sequence[Study]) -> list[Study]:
     """The studies of which something is stored. Raises StudyError where nothing is."""
-    found = [s for s in catalogue if any(is_there(case_path(root, s.name, case)) for case in s.cases)]
-    if not found:
+    studies = [s for s in catalogue if any(is_there(case_path(root, s.name, case)) for case in s.cases)]
+    if not studies:
         raise StudyError(f"nothing is stored in {root}: `organbench run` makes results, --results names their folder")
-    return found
+    return studies
 
 
 def pack(root: Path, studies: Sequence[Study], target: Path, day: str, extra: Iterable[Path] = ()) -> Packed:
@@ -99,10 +99,10 @@ def gather(root: Path, studies: Sequence[Study], stage: Path) -> list[str]:
     stage.mkdir()
     ledger = Ledger(stage)
     for study in studies:
-        found = [case_path(root, study.name, case) for case in study.cases]
-        found += [timing_file(root, study.name, case) for case in study.cases if case.timed]
-        found += [solve.path(root) for scene in study.scenes for solve in reference_solves(scene)]
-        for path in [*found, *entry_files(root)]:
+        paths = [case_path(root, study.name, case) for case in study.cases]
+        paths += [timing_file(root, study.name, case) for case in study.cases if case.timed]
+        paths += [solve.path(root) for scene in study.scenes for solve in reference_solves(scene)]
+        for path in [*paths, *entry_files(root)]:
             bring(path, stage / path.relative_to(root))
         ledger.look_again()
         link_study(ledger, study.name)
@@ -159,18 +159,18 @@ def write_zip(stage: Path, files: Sequence[Path], target: Path, day: str) -> Non
 def pins() -> str:
     """A line for each package that organbench requires, directly or not, with the version that is installed, as pip's
     `-c` option reads them."""
-    found: dict[str, str] = {}
-    waiting = [Requirement("organbench")]
-    while waiting:
-        one = waiting.pop()
+    versions: dict[str, str] = {}
+    queue = [Requirement("organbench")]
+    while queue:
+        one = queue.pop()
         name = canonicalize_name(one.name)
-        if name in found or (one.marker is not None and not one.marker.evaluate({"extra": ""})):
+        if name in versions or (one.marker is not None and not one.marker.evaluate({"extra": ""})):
             continue
         try:
-            found[name] = installed_version(name)
+            versions[name] = installed_version(name)
         except PackageNotFoundError:  # of another platform, or replaced by its user
             continue
-        waiting += map(Requirement, requires(name) or [])
-    lines = [f"{name}=={found[name]}" for name in sorted(found) if name != "organbench"]
-    head = f"# organbench {found.get('organbench', 'of the folder code')}, Python {platform.python_version()}"
+        queue += map(Requirement, requires(name) or [])
+    lines = [f"{name}=={versions[name]}" for name in sorted(versions) if name != "organbench"]
+    head = f"# organbench {versions.get('organbench', 'of the folder code')}, Python {platform.python_version()}"
     return "\n".join([head, *lines, ""])

@@ -45,14 +45,14 @@ def _row(one: Judged, ids: Mapping[str, str]) -> Best:
     speed = Measured(1 / cost.value, cost.uncertainty / cost.value**2) if cost.known else cost
     numbers = {"force": one.force, "displacement": one.displacement, "shape": one.shape, "volume": one.shape_volume}
     numbers["speed"] = speed
-    packed = {
+    pairs = {
         name: [number.value, number.uncertainty if number.uncertainty == number.uncertainty else 0.0]
         if number.known
         else None
         for name, number in numbers.items()
     }
     words = f"{body_words(one.case.body)}, {one.case.dt_fraction:g}"
-    return {"body": words, "case": ids[one.case.key], "meshes": max(1, len(one.members)), **packed}
+    return {"body": words, "case": ids[one.case.key], "meshes": max(1, len(one.members)), **pairs}
 
 
 def joined_best(parts: Sequence[Sequence[Best]], rows: Sequence[Mapping[str, Any]]) -> list[Best]:
@@ -122,7 +122,7 @@ def _errors(rows: Sequence[Best]) -> str:
         f"mean displacement error {displacement} %": displacement,
         f"shape off by {shape} % of the organ's size at most": shape,
     }
-    return ", ".join(part for part, known in words.items() if known)
+    return ", ".join(part for part, span in words.items() if span)
 
 
 def _meshes(rows: Sequence[Best]) -> str:
@@ -146,10 +146,10 @@ def _capital(words: str) -> str:
 
 def _span(rows: Sequence[Best], name: str) -> str:
     """The number of one row with its uncertainty, or the range of sizes over several."""
-    known = sorted((row[name] for row in rows if row[name]), key=lambda number: abs(number[0]))
-    if len(known) < 2:
-        return "".join(value_cell(*number, signed=name == "force") for number in known)
-    low, high = (plain(float(f"{abs(number[0]):.2g}")) for number in (known[0], known[-1]))
+    numbers = sorted((row[name] for row in rows if row[name]), key=lambda number: abs(number[0]))
+    if len(numbers) < 2:
+        return "".join(value_cell(*number, signed=name == "force") for number in numbers)
+    low, high = (plain(float(f"{abs(number[0]):.2g}")) for number in (numbers[0], numbers[-1]))
     return low if low == high else f"{low} to {high}"
 
 
@@ -164,6 +164,6 @@ def scene_rows(best: Sequence[Best]) -> list[dict[str, Any]]:
 
 def _cells(row: Best) -> dict[str, Any]:
     # Parts that are older have no volume.
-    known = {name: number for name in NUMBERS if (number := row.get(name))}
-    numbers = [value_cell(*known[name], signed=name in SIGNED) if name in known else MISSING for name in NUMBERS]
+    pairs = {name: number for name in NUMBERS if (number := row.get(name))}
+    numbers = [value_cell(*pairs[name], signed=name in SIGNED) if name in pairs else MISSING for name in NUMBERS]
     return {"case": row["case"], "body": row["body"], "numbers": numbers}

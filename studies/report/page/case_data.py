@@ -41,19 +41,19 @@ def case_data(run: Run, again: str) -> dict[str, Any]:
     law = f", law {readable(case.body.law)}" if case.body.law != "van_gelder" else ""
     title = f"{readable(case.scene.name)} · {case.body.series}{law}, {case.body.nodes} nodes · {case.method_words}"
     step = f"{1e3 * float(record.attributes['dt']):.3g} ms" if "dt" in record.attributes else "unknown"
-    ended = record.status if record.status == Status.OK else f"{record.status} ({record.message})"
-    found = {
+    outcome = record.status if record.status == Status.OK else f"{record.status} ({record.message})"
+    data = {
         "title": f"{title} · step {step}",
         "scene": case.scene.name,
-        "about": f"{case.scene.title}. Time step {step}; it ended {ended}.",
+        "about": f"{case.scene.title}. Time step {step}; it ended {outcome}.",
         "again": again,
         "duration": case.scene.duration,
         "histories": histories(run),
     }
     if run.reference is not None:
-        found["reference"] = reference_points(run)
+        data["reference"] = reference_points(run)
     surface = recorded_surface(run) or checkpoint_surface(run)
-    return found | ({"why": why_still(run)} if surface is None else {"replay": replay_of(run, surface)})
+    return data | ({"why": why_still(run)} if surface is None else {"replay": replay_of(run, surface)})
 
 
 def recorded_surface(run: Run) -> Surface | None:
@@ -92,13 +92,15 @@ def histories(run: Run) -> dict[str, Any]:
     """Volume, probed force and frame time, thinned; without those that were not measured."""
     if "t" not in run.record.fields:
         return {}
-    found = {"volume": PERCENT * (run.volume_ratio - 1)}
+    series = {"volume": PERCENT * (run.volume_ratio - 1)}
     if probes_force(run):
-        found["force"] = run.force
+        series["force"] = run.force
     if run.timing is not None:
-        found["frame"] = 1e-6 * np.median(run.timing.frame_ns, axis=0)
-    shown = {name: thinned(run.fields.t, values) for name, values in found.items()}
-    return {name: {"t": pack_series(t), "values": pack_series(values)} for name, (t, values) in shown.items() if len(t)}
+        series["frame"] = 1e-6 * np.median(run.timing.frame_ns, axis=0)
+    points = {name: thinned(run.fields.t, values) for name, values in series.items()}
+    return {
+        name: {"t": pack_series(t), "values": pack_series(values)} for name, (t, values) in points.items() if len(t)
+    }
 
 
 def probes_force(run: Run) -> bool:
@@ -112,22 +114,22 @@ def thinned(t: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     t, values = (series[np.isfinite(values)] for series in (t, values))
     if len(t) <= 2 * BINS:
         return t, values
-    kept = {0, len(t) - 1}
+    indices = {0, len(t) - 1}
     for part in np.array_split(np.arange(len(t)), BINS):
-        kept |= {int(part[np.argmin(values[part])]), int(part[np.argmax(values[part])])}
-    chosen = sorted(kept)
-    return t[chosen], values[chosen]
+        indices |= {int(part[np.argmin(values[part])]), int(part[np.argmax(values[part])])}
+    samples = sorted(indices)
+    return t[samples], values[samples]
 
 
 def reference_points(run: Run) -> dict[str, list[float | None]]:
     """Volume [%] and force [N] of the reference at its checkpoints."""
     assert run.reference is not None
-    found = {
+    series = {
         "t": run.reference.field("t"),
         "volume": PERCENT * (run.reference.field("volume") - 1),
         "force": run.reference.force,
     }
-    return {name: [float(f"{v:.5g}") if np.isfinite(v) else None for v in values] for name, values in found.items()}
+    return {name: [float(f"{v:.5g}") if np.isfinite(v) else None for v in values] for name, values in series.items()}
 
 
 def replay_of(run: Run, surface: Surface) -> dict[str, Any]:
@@ -136,20 +138,20 @@ def replay_of(run: Run, surface: Surface) -> dict[str, Any]:
     triangles = run.fields.triangles
     place = np.full(len(run.fields.rest), -1)
     place[nodes] = np.arange(len(nodes))
-    packed = pack_frames(surface.positions, run.size)
-    found = {
+    frames = pack_frames(surface.positions, run.size)
+    replay = {
         "times": [float(f"{t:.6g}") for t in times],
         "straight": surface.straight,
         "triangles": pack_indices(place[triangles[np.isin(triangles, nodes).all(axis=1)]]),
-        "positions": packed,
+        "positions": frames,
         "obstacles": [obstacle_of(obstacle, times) for obstacle in run.case.scene.obstacles],
-        "rounding": f"{PERCENT * max(0.5 * STEP, 0.5 * packed['step'] / run.size):.2g} %",
+        "rounding": f"{PERCENT * max(0.5 * STEP, 0.5 * frames['step'] / run.size):.2g} %",
     }
     if run.reference is None:
-        return found
+        return replay
     comparable = allowed(run.case.scene, COMPARED)
-    found |= {"reference": reference_id(run.case.scene), "comparable": comparable}
-    return found | errors_of(run, nodes) if comparable else found
+    replay |= {"reference": reference_id(run.case.scene), "comparable": comparable}
+    return replay | errors_of(run, nodes) if comparable else replay
 
 
 def errors_of(run: Run, nodes: np.ndarray) -> dict[str, Any]:
@@ -191,19 +193,19 @@ def entry_data(run: Run, scene: str) -> dict[str, Any]:
     takes it."""
     case, record, name = run.case, run.record, run.case.method.name
     mesh = "curved" if case.body.kind == "quadratic" else "straight"
-    ended = record.status if record.status == Status.OK else f"{record.status} ({record.message})"
+    outcome = record.status if record.status == Status.OK else f"{record.status} ({record.message})"
     file = str(record.attributes[ENTRY]).split(" sha256:")[0]
-    found = {
+    data = {
         "title": f"{readable(case.scene.name)} · entry {name}, {mesh} mesh, {case.body.nodes} nodes",
         "entry": name,
         "scene": case.scene.name,
-        "about": f"{case.scene.title}. Computed by another program and judged like our own runs; it ended {ended}.",
+        "about": f"{case.scene.title}. Computed by another program and judged like our own runs; it ended {outcome}.",
         "again": f"organbench judge {scene} {file if record.fields else 'FILE'} --name {name}",
         "duration": case.scene.duration,
         # One number is known of its computing time: it stands in the table.
         "histories": {what: values for what, values in histories(run).items() if what != "frame"},
     }
     if run.reference is not None:
-        found["reference"] = reference_points(run)
+        data["reference"] = reference_points(run)
     surface = checkpoint_surface(run)
-    return found | ({"why": why_still(run)} if surface is None else {"replay": replay_of(run, surface)})
+    return data | ({"why": why_still(run)} if surface is None else {"replay": replay_of(run, surface)})

@@ -37,8 +37,8 @@ def findings(tables: Tables) -> list[Finding]:
     """Those that the tables of the studies, by name, bear; each from rows that ended well. All but the last are of our
     own runs."""
     ours = {name: [row for row in table if not row.get("entry")] for name, table in tables.items()}
-    found = [each(ours) for each in (volume, one_volume, nearest_force, cost, real_time, limit)]
-    return [finding for finding in (*found, entries(tables)) if finding is not None]
+    candidates = [each(ours) for each in (volume, one_volume, nearest_force, cost, real_time, limit)]
+    return [finding for finding in (*candidates, entries(tables)) if finding is not None]
 
 
 def volume(tables: Tables) -> Finding | None:
@@ -63,13 +63,13 @@ def one_volume(tables: Tables) -> Finding | None:
     if not rows:
         return None
     kinds = dict.fromkeys(row["body"] for row in rows)
-    said = [f"{_range([row for row in rows if row['body'] == kind], FORCE)} in {_kind(kind)}" for kind in kinds]
+    phrases = [f"{_range([row for row in rows if row['body'] == kind], FORCE)} in {_kind(kind)}" for kind in kinds]
     worst = max(rows, key=lambda row: abs(row[FORCE]))
     return Finding(
         "Forces of bodies with one volume",
         f"{_measured(worst, FORCE)} %",
         f"Largest force error at the deepest point, of bodies that keep one volume ({_name(worst)}). Their errors are "
-        f"{' and '.join(said)}, over {counted(len({row['scene'] for row in rows}), 'scene')}.",
+        f"{' and '.join(phrases)}, over {counted(len({row['scene'] for row in rows}), 'scene')}.",
     )
 
 
@@ -81,7 +81,7 @@ def nearest_force(tables: Tables) -> Finding | None:
             best[row["scene"]] = row
     if not best:
         return None
-    said = [
+    phrases = [
         f"{_measured(row, FORCE)} % in {row['scene']} ({row['body']}, {row['nodes']} nodes; mean displacement error "
         f"{_measured(row, MEAN, signed=False)} %)"
         for row in best.values()
@@ -89,7 +89,7 @@ def nearest_force(tables: Tables) -> Finding | None:
     return Finding(
         "The force nearest to the reference",
         _range(list(best.values()), FORCE),
-        f"Force errors of the best body that keeps its volume, in each scene: {'; '.join(said)}.",
+        f"Force errors of the best body that keeps its volume, in each scene: {'; '.join(phrases)}.",
     )
 
 
@@ -98,15 +98,15 @@ def cost(tables: Tables) -> Finding | None:
     pairs = _pairs(_ended_well(tables.get("frame_rate", ()), FRAME))
     if not pairs:
         return None
-    added = sorted((_added(kept, free) for kept, free in pairs), key=lambda one: one[0])
-    cells = [value_cell(percent, spread, signed=True) for percent, spread in added]
+    overheads = sorted((_overhead(kept, free) for kept, free in pairs), key=lambda one: one[0])
+    cells = [value_cell(percent, spread, signed=True) for percent, spread in overheads]
     kept, free = max(pairs, key=lambda pair: pair[0][FRAME] / pair[1][FRAME])
     return Finding(
         "Cost of keeping a volume",
         f"{' to '.join(dict.fromkeys((cells[0], cells[-1])))} %",
         f"Time that {KEPT} adds to a frame, in {counted(len(pairs), 'pair')} of runs. The most is in "
         f"{_name(kept)}: {_measured(kept, FRAME, signed=False)} ms against {_measured(free, FRAME, signed=False)} ms. "
-        f"In {counted(sum(spread > abs(percent) for percent, spread in added), 'pair')} the repeats spread by more "
+        f"In {counted(sum(spread > abs(percent) for percent, spread in overheads), 'pair')} the repeats spread by more "
         "than the difference.",
     )
 
@@ -141,16 +141,16 @@ def limit(tables: Tables) -> Finding | None:
 
 def entries(tables: Tables) -> Finding | None:
     """Where a number of an entry from outside is the best of its scene, of all bodies and methods in all studies."""
-    contests = [found for column in CONTESTED for found in _contests(tables, column)]
+    contests = [contest for column in CONTESTED for contest in _contests(tables, column)]
     if not contests:
         return None
-    won = [_win(column, best, ours) for column, best, ours in contests if best.get("entry")]
-    told = "; ".join(won[:MOST_NAMED]) + (f"; and {len(won) - MOST_NAMED} more" if len(won) > MOST_NAMED else "")
+    wins = [_win(column, best, ours) for column, best, ours in contests if best.get("entry")]
+    words = "; ".join(wins[:MOST_NAMED]) + (f"; and {len(wins) - MOST_NAMED} more" if len(wins) > MOST_NAMED else "")
     return Finding(
         "Results of other programs",
-        f"{len(won)} of {len(contests)}",
+        f"{len(wins)} of {len(contests)}",
         "Results (force, displacement, volume and speed in each scene) in which another program beats all our bodies "
-        f"and methods{': ' if won else '.'}{told}{'.' if won else ''}",
+        f"and methods{': ' if wins else '.'}{words}{'.' if wins else ''}",
     )
 
 
@@ -159,12 +159,12 @@ def _contests(tables: Tables, column: str) -> list[tuple[str, Row, Row | None]]:
     scenes: dict[str, list[Row]] = {}
     for row in _joined(tables, column):
         scenes.setdefault(row["scene"], []).append(row)
-    found = []
+    contests = []
     for rows in scenes.values():
         ranked = sorted(rows, key=lambda row: -row[column] if column == REAL else abs(row[column]))
         if any(row.get("entry") for row in rows):
-            found.append((column, ranked[0], next((row for row in ranked if not row.get("entry")), None)))
-    return found
+            contests.append((column, ranked[0], next((row for row in ranked if not row.get("entry")), None)))
+    return contests
 
 
 def _win(column: str, best: Row, ours: Row | None) -> str:
@@ -194,7 +194,7 @@ def _pairs(rows: Sequence[Row]) -> list[tuple[Row, Row]]:
     return [(kept[key], free[key]) for key in reversed(kept) if key in free]
 
 
-def _added(kept: Row, free: Row) -> tuple[float, float]:
+def _overhead(kept: Row, free: Row) -> tuple[float, float]:
     """What the constraint adds to a frame, and how far the repeats of both spread [%]."""
     ratio = kept[FRAME] / free[FRAME]
     spread = sum((_floor(row, FRAME) or 0.0) / row[FRAME] for row in (kept, free))

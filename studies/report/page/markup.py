@@ -57,10 +57,10 @@ def tabs(charts: Mapping[str, Sequence[Mapping[str, str]]], questions: Mapping[s
             "name": name,
             "heading": heading(name),
             "question": questions[name],
-            "figures": [_figure(name, chart) for chart in drawn],
+            "figures": [_figure(name, chart) for chart in figures],
         }
-        for name, drawn in charts.items()
-        if drawn
+        for name, figures in charts.items()
+        if figures
     ]
 
 
@@ -74,16 +74,16 @@ def table(rows: Sequence[Mapping[str, Any]], cases: Mapping[str, Any]) -> Entry:
     """Heads and rows (as `study_table`, with "study" and "case") of the table, rows with errors or times first; a row
     whose case is one of `cases` links to it."""
     metrics = {metric.name: metric for metric in METRICS if metric.name in COLUMNS}
-    shown = [
+    columns = [
         name for name in COLUMNS if name in metrics and any(_value(row, metrics[name]) is not None for row in rows)
     ]
     heads = [("case", "text", "")]
-    heads += [(f"{COLUMNS[name]} [{metrics[name].unit}]", "number", metrics[name].description) for name in shown]
+    heads += [(f"{COLUMNS[name]} [{metrics[name].unit}]", "number", metrics[name].description) for name in columns]
     heads += [(words, "number" if name in NUMBERS else "text", "") for name, words in AFTER.items()]
     judged = [metrics[name] for name in JUDGED if name in metrics]
     entries = []
     for row in sorted(rows, key=lambda row: all(_value(row, metric) is None for metric in judged)):
-        cells = [_metric_cell(row, metrics[name]) for name in shown]
+        cells = [_metric_cell(row, metrics[name]) for name in columns]
         cells += [_word_cell(row.get(name), name) for name in AFTER]
         entries.append(_names(row, cases) | {"cells": cells})
     return {"heads": heads, "rows": entries}
@@ -122,8 +122,8 @@ def _metric_cell(row: Mapping[str, Any], metric: Any) -> Cell:
     floor = row.get(f"{metric.name} floor [{metric.unit}]")
     doubtful = metric.name in str(row.get(UNRESOLVED) or "").split()
     # A volume is compared with the body's own: the reference's floor is none of its.
-    known = float("nan") if floor is None or metric.name == "volume_worst" else float(floor)
-    cell = value_cell(float(value), known, signed=metric.name in SIGNED, unresolved=doubtful)
+    uncertainty = float("nan") if floor is None or metric.name == "volume_worst" else float(floor)
+    cell = value_cell(float(value), uncertainty, signed=metric.name in SIGNED, unresolved=doubtful)
     return "number", f"{abs(float(value)):.6g}", cell
 
 

@@ -19,12 +19,12 @@ DEEPEST = 30_000
 
 def pack_series(values: np.ndarray) -> dict[str, Any]:
     """Numbers (n,), NaN and infinities as missing, each rounded to 1/131,000 of their range."""
-    known = np.isfinite(values)
-    low, high = (float(end) for end in (values[known].min(), values[known].max())) if known.any() else (0.0, 0.0)
+    finite = np.isfinite(values)
+    low, high = (float(end) for end in (values[finite].min(), values[finite].max())) if finite.any() else (0.0, 0.0)
     # Where all are equal, or a float apart, every level means the same.
     scale = LEVELS / (high - low) if high - low > np.finfo(float).tiny * LEVELS else 0.0
     levels = np.full(len(values), LEVELS + 1)
-    levels[known] = np.rint((values[known] - low) * scale).astype(int)
+    levels[finite] = np.rint((values[finite] - low) * scale).astype(int)
     return {"low": low, "high": high, "data": _text(levels.astype("<u2").tobytes())}
 
 

@@ -95,14 +95,14 @@ def other_studies(root: Path, studies: Sequence[Study]) -> tuple[list[Study], li
         records = record_files(root, folder.name)
         if not records:
             continue
-        kept = Study(folder.name, "", (), (), ())
-        part = read_part(root, kept)
+        study = Study(folder.name, "", (), (), ())
+        part = read_part(root, study)
         if part is None:
             remarks.append(f"report.html: {folder.name} is not on the page; `organbench report FILE.py`, with the file "
                            "that defines the study, adds it")  # fmt: skip
             continue
-        others.append(replace(kept, **{name: str(part["study"][name]) for name in ABOUT if name != "name"}))
-        if max(path.stat().st_mtime_ns for path in records) > part_path(root, kept).stat().st_mtime_ns:
+        others.append(replace(study, **{name: str(part["study"][name]) for name in ABOUT if name != "name"}))
+        if max(path.stat().st_mtime_ns for path in records) > part_path(root, study).stat().st_mtime_ns:
             again = command_line("report", others[-1:])
             remarks.append(f"report.html: {folder.name} shows its last charts; `{again}` redraws them")
     return others, remarks

@@ -44,7 +44,7 @@ def inline(text: str, name: str, title: str) -> str:
     body = PICTURE.sub(_small_picture, body)
     body = UNUSED_NAME.sub("", body)
     numbers: dict[str, int] = {}  # matplotlib's names hash places, which may differ by their last bit
-    body = NAMES.sub(lambda found: f"{found[1]}{name}-{numbers.setdefault(found[2], len(numbers))}", body)
+    body = NAMES.sub(lambda match: f"{match[1]}{name}-{numbers.setdefault(match[2], len(numbers))}", body)
     body = PLACES.sub(_rounded, body)
     head, rest = body.split(">", 1)
     head = re.sub(r'\s(width|height|id)="[^"]*"', "", head)
@@ -70,9 +70,9 @@ def cleaned(text: str) -> str:
 
 def _clean(element: ElementTree.Element) -> None:
     element.tag = _local(element.tag)
-    kept = {_local(name): value for name, value in element.attrib.items()}
+    attributes = {_local(name): value for name, value in element.attrib.items()}
     element.attrib.clear()
-    element.attrib.update({name: value for name, value in kept.items() if _allowed(name, value)})
+    element.attrib.update({name: value for name, value in attributes.items() if _allowed(name, value)})
     if element.tag not in ("text", "tspan"):
         element.text = None
     element.tail = element.tail if (element.tail or "").strip() else None
@@ -94,14 +94,14 @@ def _local(name: str) -> str:
     return name.rpartition("}")[2]
 
 
-def _small_picture(found: re.Match[str]) -> str:
+def _small_picture(match: re.Match[str]) -> str:
     """A PNG with COLOURS colours in place of one with all."""
-    image = Image.open(io.BytesIO(base64.b64decode(found[1]))).convert("RGBA")
+    image = Image.open(io.BytesIO(base64.b64decode(match[1]))).convert("RGBA")
     small = io.BytesIO()
     image.quantize(COLOURS, Image.Quantize.FASTOCTREE).save(small, "png", optimize=True)
     return f"data:image/png;base64,{base64.b64encode(small.getvalue()).decode('ascii')}"
 
 
-def _rounded(found: re.Match[str]) -> str:
-    short = NUMBER.sub(r"\1", found[2])
-    return f'{found[1]}="{short}"'
+def _rounded(match: re.Match[str]) -> str:
+    short = NUMBER.sub(r"\1", match[2])
+    return f'{match[1]}="{short}"'

@@ -105,12 +105,12 @@ def joined_cases(parts: Sequence[Part]) -> dict[str, Any]:
 
 def joined_rows(rows: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
     """A row per case: what one study of it did not measure is that of the next, and all are named."""
-    found: dict[str, dict[str, Any]] = {}
+    by_case: dict[str, dict[str, Any]] = {}
     for row in rows:
-        one = found.setdefault(row["case"], {**row, "study": ""})
+        one = by_case.setdefault(row["case"], {**row, "study": ""})
         one |= {name: value for name, value in row.items() if one.get(name) is None}
         one["study"] = ", ".join(filter(None, (one["study"], row["study"])))
-    return list(found.values())
+    return list(by_case.values())
 
 
 def fitting(parts: Parts, machine: dict[str, Any], league: Sequence[Mapping[str, Any]] = ()) -> tuple[Page, list[str]]:
@@ -118,17 +118,17 @@ def fitting(parts: Parts, machine: dict[str, Any], league: Sequence[Mapping[str,
     a sentence where even without cases it is larger."""
     cases = joined_cases([part for _, part in parts])
     first = first_case(cases)
-    given = {"cases": _heads(cases), "first": first, "folder": FOLDER, "pieces": {}}
-    room, files = LIMIT - len(page(parts, given, machine, league)), {}
+    data = {"cases": _heads(cases), "first": first, "folder": FOLDER, "pieces": {}}
+    room, files = LIMIT - len(page(parts, data, machine, league)), {}
     for name, piece in _pieces(parts, cases, first).items():
         text = script_json(piece)
         size = len(text.encode()) + len(name) + len('"":,')
         if size <= room:
-            given["pieces"][name] = piece
+            data["pieces"][name] = piece
             room -= size
         else:
             files[f"{name}.js"] = f"keepPiece({json.dumps(name)}, {text});\n".encode()
-    content = page(parts, given, machine, league)
+    content = page(parts, data, machine, league)
     large = f"report.html has {len(content):,} bytes, more than {LIMIT:,}: its charts and its table are large"
     return Page(content, files), [large] if len(content) > LIMIT else []
 
@@ -160,21 +160,21 @@ def _rank(case: dict[str, Any]) -> int:
 
 
 def page(
-    parts: Parts, given: Mapping[str, Any], machine: dict[str, Any], league: Sequence[Mapping[str, Any]] = ()
+    parts: Parts, data: Mapping[str, Any], machine: dict[str, Any], league: Sequence[Mapping[str, Any]] = ()
 ) -> bytes:
-    """The file. given: what its script reads."""
+    """The file. data: what its script reads."""
     rows = [{"study": study.name, **row} for study, part in parts for row in part["rows"]]
-    shown = joined_rows(rows)
+    case_rows = joined_rows(rows)
     tables = {study.name: part["rows"] for study, part in parts}
     names = [study.name for study, _ in parts]
     script = "\n".join((ASSETS / name).read_text(encoding="utf-8") for name in SCRIPTS)
     studies = [study for study, _ in parts]
     # A study of a FILE is the user's own, and so are its scenes.
     own = {row["scene"] for study, part in parts if study.word for row in part["best"]}
-    best = own_first(joined_best([part["best"] for _, part in parts], shown), own)
+    best = own_first(joined_best([part["best"] for _, part in parts], case_rows), own)
     text = TEMPLATES.get_template("page.html").render(
         style=Markup((ASSETS / "page.css").read_text(encoding="utf-8")),
-        summary=f"{_counted(shown)} of {counted(len(parts), 'study', 'studies')}: {', '.join(names)}. "
+        summary=f"{_counted(case_rows)} of {counted(len(parts), 'study', 'studies')}: {', '.join(names)}. "
         "Volume-preserving mass-spring organs against nearly incompressible finite elements.",
         answers=answers(best, own),
         best_heads=HEADS,
@@ -184,8 +184,8 @@ def page(
             {study.name: part["charts"] for study, part in parts},
             {study.name: " ".join(study.question.split()) for study in studies},
         ),
-        cases=table(shown, given["cases"]),
-        count=counted(len(shown), "case"),
+        cases=table(case_rows, data["cases"]),
+        count=counted(len(case_rows), "case"),
         csv=base64.b64encode(csv_of(rows).encode()).decode("ascii"),
         commands=[
             command_line("run", studies, elsewhere=True),
@@ -193,7 +193,7 @@ def page(
         ],
         machine=machine_words(machine),
         league=league,
-        data=Markup(script_json(given)),
+        data=Markup(script_json(data)),
         script=Markup(script),
         digest=base64.b64encode(sha256(script.encode()).digest()).decode("ascii"),
     )

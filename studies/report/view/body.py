@@ -39,10 +39,10 @@ class Shown:
     @property
     def positions(self) -> np.ndarray:
         """[m], (K, n, 3). A body that ended early stays where it was last; its displacement there is NaN."""
-        found, last = np.empty_like(self.displacement), self.rest
-        for k, moved in enumerate(self.rest + self.displacement):
-            last = found[k] = moved if np.isfinite(moved).all() else last
-        return found
+        positions, last = np.empty_like(self.displacement), self.rest
+        for k, frame in enumerate(self.rest + self.displacement):
+            last = positions[k] = frame if np.isfinite(frame).all() else last
+        return positions
 
 
 def upright(rest: np.ndarray, cells: np.ndarray) -> np.ndarray:

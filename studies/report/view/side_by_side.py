@@ -53,8 +53,8 @@ class Grid:
 
 def places(bodies: Sequence[Shown]) -> np.ndarray:
     """Where each body is moved to [m], (bodies, 3): in rows along x, the first on top (z)."""
-    moved = [body.positions.reshape(-1, 3) for body in bodies]
-    pitch = GAP * max(float(np.ptp(points, axis=0).max()) for points in moved)
+    positions = [body.positions.reshape(-1, 3) for body in bodies]
+    pitch = GAP * max(float(np.ptp(points, axis=0).max()) for points in positions)
     row, column = np.divmod(np.arange(len(bodies)), int(np.ceil(np.sqrt(len(bodies)))))
     return pitch * np.column_stack([column, 0 * row, -row])
 
@@ -87,15 +87,15 @@ CASE = "number of the body in case_name"
 
 
 def _point_data(bodies: Sequence[Shown], offset: np.ndarray, case: np.ndarray) -> dict[str, Data]:
-    found = {
+    data = {
         "displacement": Data(np.concatenate([b.displacement for b in bodies], axis=1), True, "m", "from rest"),
         "offset": Data(offset, False, "m", "shift of the body to the side: its positions are points minus this"),
         "case": Data(case, False, "1", CASE),
     }
     if any(body.error is not None for body in bodies):
         errors = [np.full_like(b.displacement, np.nan) if b.error is None else b.error for b in bodies]
-        found["error"] = Data(np.concatenate(errors, axis=1), True, "m", "displacement minus that of the reference")
-    return found
+        data["error"] = Data(np.concatenate(errors, axis=1), True, "m", "displacement minus that of the reference")
+    return data
 
 
 def _field_data(times: np.ndarray, bodies: Sequence[Shown]) -> dict[str, Data]:

@@ -58,7 +58,7 @@ def stored_runs(root: Path) -> tuple[list[Stored], list[StudyError]]:
     if not root.is_dir():
         raise StudyError(f"there is no folder {root}; --results names the folder of the results")
     studies = [folder.name for folder in sorted(root.iterdir()) if folder.is_dir() and folder.name != REFERENCES]
-    found, problems = dict[tuple[str, str], Stored](), list[StudyError]()
+    runs, problems = dict[tuple[str, str], Stored](), list[StudyError]()
     for path in (path for study in studies for path in record_files(root, study)):
         try:
             entry = stored_run(path)
@@ -66,8 +66,8 @@ def stored_runs(root: Path) -> tuple[list[Stored], list[StudyError]]:
             problems.append(problem)
             continue
         if entry is not None:
-            found.setdefault((entry.physics, entry.header.fingerprint), entry)
-    return sorted(found.values(), key=lambda run: run.path.stem), problems
+            runs.setdefault((entry.physics, entry.header.fingerprint), entry)
+    return sorted(runs.values(), key=lambda run: run.path.stem), problems
 
 
 def stored_run(path: Path) -> Stored | None:
@@ -91,12 +91,12 @@ def chosen_runs(words: Sequence[str], runs: Sequence[Stored], scenes: Iterable[s
 
     Raises StudyError for a word that names nothing, and for a file without a run to see.
     """
-    known: dict[str, list[Stored]] = {scene: [] for scene in scenes}
+    by_word: dict[str, list[Stored]] = {scene: [] for scene in scenes}
     for run in runs:
         for word in dict.fromkeys((run.scene, *run.words)):
-            known.setdefault(word, []).append(run)
-    found = [run for word in words for run in (_in_file(word) or lookup(word, known, "scene or stored case"))]
-    return list({run.path.resolve(): run for run in found}.values())
+            by_word.setdefault(word, []).append(run)
+    matches = [run for word in words for run in (_in_file(word) or lookup(word, by_word, "scene or stored case"))]
+    return list({run.path.resolve(): run for run in matches}.values())
 
 
 def _in_file(word: str) -> list[Stored]:

@@ -58,13 +58,13 @@ def variants() -> list[Variant]:
     comes before the second of any.
     """
     methods = (*(method() for method in (*METHODS, *LITERATURE)), *VARIANTS)
-    found = [variant for method in methods for variant in variants_of(method)]
-    found.sort(key=lambda one: (one.kind not in OWN_TYPES, one.option != PLAIN, _rank(one.method)))
+    all_variants = [variant for method in methods for variant in variants_of(method)]
+    all_variants.sort(key=lambda one: (one.kind not in OWN_TYPES, one.option != PLAIN, _rank(one.method)))
     first: dict[tuple[str, ...], Variant] = {}
-    for one in found:
+    for one in all_variants:
         first.setdefault((family(one.method), one.precision, one.option), one)
     begin = set(first.values())
-    return sorted(found, key=lambda one: (one.kind not in OWN_TYPES, one.option != PLAIN, one not in begin))
+    return sorted(all_variants, key=lambda one: (one.kind not in OWN_TYPES, one.option != PLAIN, one not in begin))
 
 
 def variants_of(method: Method) -> Iterator[Variant]:

@@ -7,9 +7,9 @@ from collections.abc import Iterable
 from studies.base.compile_watch import Compiled
 
 
-def summary(found: Iterable[Compiled], most: int = 10) -> list[str]:
+def summary(compiled: Iterable[Compiled], most: int = 10) -> list[str]:
     """Lines: how much was compiled, how much of it twice, and the `most` functions that took longest."""
-    entries = list(found)
+    entries = list(compiled)
     distinct = {(entry.function, entry.arguments) for entry in entries}
     total = sum(entry.seconds for entry in entries)
     lines = [
@@ -22,10 +22,10 @@ def summary(found: Iterable[Compiled], most: int = 10) -> list[str]:
     return lines + [f"{sum(times):8.2f} s  {len(times):3d} x  {name}" for name, times in by_time[:most]]
 
 
-def listing(found: Iterable[Compiled]) -> str:
+def listing(compiled: Iterable[Compiled]) -> str:
     """A CSV table with a row for each function and its argument types."""
     text = io.StringIO()
     table = csv.writer(text, lineterminator="\n")
     table.writerow(("function", "processor time [s]", "arguments"))
-    table.writerows((entry.function, f"{entry.seconds:.3f}", entry.arguments) for entry in found)
+    table.writerows((entry.function, f"{entry.seconds:.3f}", entry.arguments) for entry in compiled)
     return text.getvalue()

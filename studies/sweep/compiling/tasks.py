@@ -32,10 +32,10 @@ def tasks() -> dict[str, Callable[[], None]]:
 
     One process begins with the kernels that all frames share, the other with those of the reference.
     """
-    found = {variant.name: partial(frames.advance, variant) for variant in frames.variants()}
-    first, *rest = found
+    frame_tasks = {variant.name: partial(frames.advance, variant) for variant in frames.variants()}
+    first, *rest = frame_tasks
     order = [first, *elements.TASKS, *rest]
-    return {name: elements.TASKS.get(name) or found[name] for name in order}
+    return {name: elements.TASKS.get(name) or frame_tasks[name] for name in order}
 
 
 ESSENTIAL: tuple[str, ...] = (

@@ -24,7 +24,7 @@ from studies.runs.user_code import Given, given_files
 from studies.store.ledger import Ledger
 from studies.sweep.engines.requests import DoJob, FrameTimes, Preparation, check_for, wait_until_seen
 from studies.sweep.engines.worker import MEGABYTES, JobPlugin, do, machine
-from studies.sweep.executor import Progress, Told
+from studies.sweep.executor import CompileListener, Progress
 from studies.sweep.job import Job, case_jobs
 from studies.sweep.local import environment, files_for
 
@@ -65,26 +65,26 @@ class Session:
         too long."""
         while not self.faults.empty():
             warnings.warn(f"{self.faults.get()}; it gets no job", stacklevel=2)
-        found = {place: worker for place, worker in self.workers().items() if worker["resources"].get(self.name)}
-        if found:
+        fit_workers = {place: worker for place, worker in self.workers().items() if worker["resources"].get(self.name)}
+        if fit_workers:
             self.manned = time.monotonic()
         elif time.monotonic() > self.manned + self.patience:
             raise StudyError(
                 f"the cluster has had no worker for {self.patience:g} s: start some with `organbench worker`; finished "
                 "work is stored; run the same command to continue"
             )
-        return found
+        return fit_workers
 
     def begin(self, plugin: JobPlugin) -> None:
         """Returns when all workers that are there are fit, and there is one. Raises StudyError for one that is not."""
         while not self.workers():
             self.fit()
             time.sleep(LOOK_SECONDS / 5)
-        known = self.workers()
-        found: Any = self.client.run(find_spec, "studies")
-        bare = [place for place, spec in found.items() if spec is None]
+        workers = self.workers()
+        specs: Any = self.client.run(find_spec, "studies")
+        bare = [place for place, spec in specs.items() if spec is None]
         if bare:
-            name = known[bare[0]]["name"]
+            name = workers[bare[0]]["name"]
             raise StudyError(f"worker {name} cannot load organbench; install it there; nothing has run")
         try:
             self.client.register_plugin(plugin, name=self.name)
@@ -176,7 +176,7 @@ class Cluster:
         finally:
             session.end()
 
-    def map(self, jobs: Sequence[Job], on_compile: Told) -> Generator[tuple[Job, str | None]]:
+    def map(self, jobs: Sequence[Job], on_compile: CompileListener) -> Generator[tuple[Job, str | None]]:
         """As every executor; what workers compile is not shown. No more jobs are with Dask than can be done at a time:
         a worker that is lost costs those a try that it had."""
         if not jobs:
@@ -198,7 +198,7 @@ class Cluster:
         wait_until_seen(done)
 
     def measure(
-        self, ledger: Ledger, study: Study, progress: Progress, on_compile: Told, among: set[Path] | None
+        self, ledger: Ledger, study: Study, progress: Progress, on_compile: CompileListener, among: set[Path] | None
     ) -> int:
         """As every executor: on one worker of each kind of machine, after all jobs, one machine after the other."""
         root = ledger.root.absolute()

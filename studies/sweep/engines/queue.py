@@ -52,7 +52,7 @@ QUEUES = {
     "oar": OARCluster,
 }
 Lines = tuple[str, ...]
-Told = Callable[[str], object]
+Listener = Callable[[str], object]
 
 
 @with_config(ConfigDict(extra="forbid", strict=False))
@@ -99,9 +99,9 @@ def read_settings(path: Path) -> Settings:
         raise StudyError(f"{path} cannot be read as YAML ({' '.join(str(error).split())})") from error
     if not isinstance(given, dict):
         raise StudyError(f"{path} holds no settings; write lines such as `kind: slurm` (docs/cluster.md)")
-    known = {field.name: field for field in fields(Settings)}
+    fields_by_name = {field.name: field for field in fields(Settings)}
     for word in given:
-        lookup(str(word), known, f"setting in {path.name}")
+        lookup(str(word), fields_by_name, f"setting in {path.name}")
     try:
         settings = _adapter().validate_python(given)
     except ValidationError as error:
@@ -122,7 +122,7 @@ def _adapter() -> TypeAdapter[Settings]:
 
 
 @contextmanager
-def scheduler_with_workers(settings: Settings, root: Path, tell: Told) -> Iterator[str]:
+def scheduler_with_workers(settings: Settings, root: Path, tell: Listener) -> Iterator[str]:
     """The address of a scheduler of this process, for which workers are started; `tell` hears how. Inside, clients of
     this process hold its key; without it nobody talks to the scheduler.
 

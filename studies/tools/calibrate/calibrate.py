@@ -14,7 +14,7 @@ from studies.scene.kind import has_wall
 from studies.scene.scene import Scene
 from studies.store.ledger import Ledger
 from studies.store.machine import this_machine
-from studies.sweep.executor import Progress, Silent, Told
+from studies.sweep.executor import CompileListener, Progress, Silent
 from studies.tools.calibrate.fit import Fit, fit
 from studies.tools.calibrate.folds import Fold, folds_of, own_scenes
 from studies.tools.calibrate.measured import Measurements, bring_up_to_date, pending
@@ -45,7 +45,7 @@ def calibrate(
     results: Path | str = RESULTS,
     jobs: int = 1,
     progress: Progress | None = None,
-    on_compile: Told | None = None,
+    on_compile: CompileListener | None = None,
     folds: Sequence[Fold] | None = None,
 ) -> Calibration:
     """Fits few numbers of a body to the references of an organ, tries the fit on other scenes, stores what came of it.

@@ -11,7 +11,7 @@ from studies.runs.case import BodyRecipe, Case
 from studies.scene.scene import Scene
 from studies.store.ledger import Ledger
 from studies.store.record import read_record
-from studies.sweep.executor import Progress, Told, perform
+from studies.sweep.executor import CompileListener, Progress, perform
 from studies.sweep.job import CaseJob, Job, reference_jobs
 from studies.sweep.local import Local
 from studies.sweep.run_studies import check_writable
@@ -25,7 +25,7 @@ def pending(ledger: Ledger, scenes: Iterable[Scene], start: BodyRecipe) -> list[
     return sorted((job for job in jobs if ledger.why(job) is not None), key=lambda job: -job.weight)
 
 
-def bring_up_to_date(todo: list[Job], root: Path, jobs: int, progress: Progress, on_compile: Told) -> None:
+def bring_up_to_date(todo: list[Job], root: Path, jobs: int, progress: Progress, on_compile: CompileListener) -> None:
     """Does them in `jobs` processes. Raises StudyError when results cannot be written."""
     check_writable(root)
     perform(Local(jobs), todo, progress, on_compile, Job.store_failure)

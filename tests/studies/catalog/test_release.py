@@ -11,7 +11,7 @@ from studies.base.errors import StudyError
 from studies.cli.loading import COMMANDS
 from studies.report import release
 from studies.report.publish import EXTRAS, PUBLISHED
-from studies.report.release import Step, check_commit, check_complete, seconds_of, steps, told
+from studies.report.release import Step, check_commit, check_complete, schedule, seconds_of, steps
 from studies.store.ledger import Ledger
 from studies.store.stamps import set_stamp
 
@@ -77,7 +77,7 @@ def two_steps(monkeypatch, tmp_path):
 
     monkeypatch.setattr(release, "steps", lambda: found)
     monkeypatch.setattr(release, "check_commit", lambda home: "0" * 40)
-    monkeypatch.setattr(release, "check_complete", lambda published, found: None)
+    monkeypatch.setattr(release, "check_complete", lambda published, all_steps: None)
     monkeypatch.setattr(release.crosscheck, "available", lambda: True)
     monkeypatch.setattr(release.subprocess, "run", run)
     return ran, fails
@@ -112,7 +112,7 @@ def test_a_study_takes_what_its_cases_take(tmp_path):
     (step,) = [one for one in steps() if one.study == "stability_map"]
     seconds = seconds_of(step, Ledger(tmp_path))
     assert 60.0 < seconds < 3600.0 * 24
-    assert f"about {seconds / 60.0:.0f} min" in told([step], [seconds])[0]
+    assert f"about {seconds / 60.0:.0f} min" in schedule([step], [seconds])[0]
 
 
 def test_code_that_is_not_committed_is_refused(tmp_path):

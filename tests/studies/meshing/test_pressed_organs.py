@@ -61,7 +61,7 @@ def test_a_liver_nobody_has_seen(member, mesh_cache, tmp_path, monkeypatch):
 
     found = error()
     monkeypatch.setattr(graded_mesh, "middles", lambda scene: 0.5)
-    assert found < 0.02 and found < 0.5 * error()
+    assert found < 0.03 and found < 0.5 * error()
 
 
 @pytest.mark.campaign
@@ -86,4 +86,4 @@ def test_a_spleen_nobody_has_seen_hangs(seed, mesh_cache, tmp_path, monkeypatch)
 
     found = error()
     monkeypatch.setattr(graded_mesh, "middles", lambda scene: 0.5)
-    assert found < 1.6 and found < 0.6 * error()
+    assert found < 1.7 and found < 0.6 * error()

@@ -66,7 +66,7 @@ def test_a_piece_that_died_is_stored_as_failed(tmp_path):
 
 def test_what_another_command_has_done_meanwhile_is_not_done_again(results):
     (job,) = (job for job in jobs_of(results, [tiny_study()]) if job.work == tiny_case(timed=True))
-    planned = replace(job, seen=job.state())
+    planned = replace(job, initial_state=job.state())
     assert not planned.done_meanwhile(), "it is asked for as it is"
     path = job.path()
     write_record(path, read_record(path))
@@ -151,6 +151,17 @@ def test_a_mesh_that_cannot_be_made_is_stored_as_failed_with_its_reason(tmp_path
     stored = peek(do(job))
     assert (stored.status, stored.message) == (Status.FAILED, "ball: use more nodes")
     assert Ledger(tmp_path).why(job) is None
+
+
+def test_equations_without_a_solution_cost_one_scene_and_not_the_sweep(tmp_path, monkeypatch):
+    """A stomach of the population ended a study of five hours by a dense system without an inverse."""
+    monkeypatch.setattr("studies.reference.solve.solve", lambda *_: np.linalg.solve(np.zeros((1, 1)), np.ones(1)))
+    job = ReferenceJob(tmp_path, "made_up", reference_solves(UNPUBLISHED)[0])
+    stored = peek(do(job))
+    assert (stored.status, stored.message) == (
+        Status.FAILED,
+        "the equations of the reference cannot be solved: Singular matrix",
+    )
 
 
 def test_a_result_that_cannot_be_stored_ends_the_sweep(tmp_path, monkeypatch):
