@@ -20,6 +20,7 @@ from studies.geometry.mesher.jobs import cache_folder
 from studies.reference.reference_solves import STUDY as REFERENCES
 from studies.report.results import refresh
 from studies.report.results import report as write_report
+from studies.scene.kind import load_of
 from studies.store.entry import MISSING
 from studies.store.ledger import Ledger
 from studies.store.links import link_study
@@ -149,12 +150,21 @@ def _bring_up_to_date(
     return not odd
 
 
+HANGING = "not known: of organs that hang two meshes can agree and both be wrong; use 1,594 nodes"
+"""Of 30 random spleens two meshes that agreed hid six of nine errors beyond the target (docs/population.md)."""
+
+
 def _say_trust(root: Path, study: Study) -> None:
     """Whether two meshes of a scene without a reference agree."""
     from studies.metrics.trust import verdicts  # with the geometry of surfaces
     from studies.sweep.load import load_runs
 
-    for verdict in verdicts(load_runs(root, study)[0]):
+    runs, _ = load_runs(root, study)
+    hanging = {run.case.scene.name for run in runs if load_of(run.case.scene) == "sag"}
+    for verdict in verdicts(runs):
+        if verdict.trusted and verdict.scene in hanging:
+            say(f"{verdict.scene}: trust its best body: {HANGING}; {verdict.why}")
+            continue
         answer = "yes" if verdict.trusted else "no: use more nodes"
         say(f"{verdict.scene}: trust its best body: {answer}, because {verdict.why}")
 

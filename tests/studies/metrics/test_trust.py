@@ -85,3 +85,13 @@ def test_a_run_of_a_scene_ends_with_the_verdict(monkeypatch, capsys, shift, answ
     monkeypatch.setattr("studies.sweep.load.load_runs", lambda root, study: (runs, []))
     _say_trust(Path(), tiny_study())
     assert f"ball_clamped: trust its best body: {answer}, because two meshes" in capsys.readouterr().out
+
+
+def test_a_run_of_an_organ_that_hangs_never_says_yes(monkeypatch, capsys):
+    """Two meshes of a spleen that agree may both be wrong (docs/population.md)."""
+    runs = [body_run(COARSE, shift=0.9999), body_run(FINE)]
+    runs = [replace(one, case=replace(one.case, scene=SPLEEN_SAG)) for one in runs]
+    monkeypatch.setattr("studies.sweep.load.load_runs", lambda root, study: (runs, []))
+    _say_trust(Path(), tiny_study())
+    said = capsys.readouterr().out
+    assert "spleen_sag: trust its best body: not known" in said and "1,594 nodes" in said and ": yes" not in said
