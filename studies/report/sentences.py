@@ -206,13 +206,14 @@ def random_organs(published: Path) -> str:
         bounds.append(f"{organ} {force:.1f} and {mean:.2g} %" if force == force else f"{organ} {mean:.2g} %")
         speeds += [1.0 / speed for speed in column(members[nodes], SPEED)]
         missed += sum(_misses(organ, row) for row in members[nodes])
-    total = sum(len(members[nodes]) for members in populations.values())
+    finest = [row for members in populations.values() for row in members[nodes]]
+    bars = [max(column(finest, name.replace(" [", " floor ["))) for name in (FORCE, MEAN)]
     return (
         f"**Random organs** ({counts}; shape, tissue and load are random): 95 of 100 have at most these errors in "
         f"force and mean displacement with adaptive bodies of {nodes:,} surface nodes: {', '.join(bounds)} (no "
-        f"probe, no force). {missed} of {total} miss their target (3 and 1 %, hollow "
-        f"organs 6 and 3 %) or fail. A simulated second takes {_range(speeds, 1)} s on one core ([random "
-        f"organs](docs/population.md))."
+        f"probe, no force; references within {bars[0]:.1f} and {bars[1]:.1f} %). {missed} of {len(finest)} miss their "
+        f"target (3 and 1 %, hollow organs 6 and 3 %) or fail. A simulated second of one member of each organ takes "
+        f"{_range(speeds, 1)} s on one core ([random organs](docs/population.md))."
     )
 
 
