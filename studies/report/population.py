@@ -15,6 +15,8 @@ from studies.store.record import Status
 
 WORST = 10
 """Members of each organ that are taken apart."""
+CHOSEN_ON = {"liver": 27, "kidney": 27, "stomach": 27, "spleen": 30, "bladder": 30}
+"""Members of each organ, the first ones, on which the rule of the warning was chosen (studies.metrics.trust)."""
 NONE = "No results yet: run `make study-population`."
 
 
@@ -114,25 +116,33 @@ def rigid_share(run: Run) -> float:
 
 def trust_of(runs: Sequence[Run]) -> str:
     """How often the comparison of two meshes names a member whose finer body is beyond the target, and doubts one that
-    is within, of members of even and of odd number."""
+    is within, of the members on which its rule was chosen and of those drawn later."""
     comparisons = judgements(runs)
     if not comparisons:
         return NONE
     lines = [
-        "| meshes | members | beyond the target | named | within it | doubted |",
+        "| organ | nodes of the two meshes | chosen on: beyond the target, named | within it, doubted "
+        "| judged on: beyond the target, named | within it, doubted |",
         "|---|---|---|---|---|---|",
     ]
-    for words, some in _halves(comparisons).items():
-        count = tally(some)
-        cells = [len(some), count.beyond, count.named, count.within, count.doubted]
-        lines.append(f"| {words} | " + " | ".join(str(cell) for cell in cells) + " |")
+    pairs: dict[str, list[Judgement]] = {}
+    for one in comparisons:
+        words = f"{_organ(one)} | {one.nodes[0]:,} and {one.nodes[1]:,}"
+        pairs.setdefault(words, []).append(one)
+    for words, some in [*pairs.items(), ("all | all", comparisons)]:
+        earlier = [one for one in some if _number_of(one) < CHOSEN_ON.get(_organ(one), 0)]
+        later = [one for one in some if one not in earlier]
+        cells = []
+        for part in (earlier, later):
+            count = tally(part)
+            cells += [f"{count.beyond}, {count.named}", f"{count.within}, {count.doubted}"] if part else ["–", "–"]
+        lines.append(f"| {words} | " + " | ".join(cells) + " |")
     return "\n".join(lines)
 
 
-def _halves(comparisons: Sequence[Judgement]) -> dict[str, list[Judgement]]:
-    """Judgements by pair of meshes and half of the members."""
-    halves: dict[str, list[Judgement]] = {}
-    for one in comparisons:
-        half = "odd" if int(one.scene.rsplit("_", 1)[1]) % 2 else "even"
-        halves.setdefault(f"{one.nodes[0]:,} and {one.nodes[1]:,} nodes, members of {half} number", []).append(one)
-    return halves
+def _organ(one: Judgement) -> str:
+    return one.scene.split("_")[0]
+
+
+def _number_of(one: Judgement) -> int:
+    return int(one.scene.rsplit("_", 1)[1])

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from massspring import ImplicitVolume
-from studies.catalog.accuracy import LONG, SHORT, even, graded
+from studies.catalog.accuracy import FINEST, LONG, SHORT, even, graded
 from studies.catalog.population.draw import Population
 from studies.catalog.study import Chart, Study
 from studies.runs.case import BodyRecipe, Case
@@ -23,16 +23,13 @@ MEMBERS = (
 NODES = 550
 """Surface nodes of the linear bodies, of a hollow organ as many again on its lumen."""
 
-FINER = 1594
-"""Nodes of the finest graded body; the accuracy study ends at three quarters of it."""
-
 
 def recipes_for(scene: Scene) -> tuple[tuple[BodyRecipe, float], ...]:
     """The bodies that every member gets, and their step over the limit: the paper's; one volume; one volume per node;
     the fastest even quadratic body; the graded ones of the accuracy study, and a finer one, which shows what a larger
     budget of computing time is worth."""
     axis = "centre_line" if has_wall(scene) else "straight"
-    budgets = (*graded(scene), *(replace(body, nodes=FINER) for body in graded(scene)[-1:]))
+    budgets = (*graded(scene), *(replace(body, nodes=FINEST) for body in graded(scene)[-1:]))
     return (
         (BodyRecipe("surface", NODES, axis=axis), SHORT),
         (BodyRecipe(nodes=NODES), SHORT),

@@ -20,7 +20,6 @@ from studies.geometry.mesher.jobs import cache_folder
 from studies.reference.reference_solves import STUDY as REFERENCES
 from studies.report.results import refresh
 from studies.report.results import report as write_report
-from studies.scene.kind import load_of
 from studies.store.entry import MISSING
 from studies.store.ledger import Ledger
 from studies.store.links import link_study
@@ -42,9 +41,6 @@ MAIN_STUDIES = ", ".join(study.name for study in STUDIES if study.main)
 GIVEN = f"studies, or a FILE.py with STUDY or SCENE ({PROGRAM}); default: {MAIN_STUDIES}"
 Wanted = Callable[[Job], bool] | None
 Rule = Callable[[Ledger, Job], bool]
-
-HANGING = "not known: of organs that hang two meshes can agree and both be wrong; use 1,594 nodes"
-"""Of 30 random spleens two meshes that agreed hid six of nine errors beyond the target (docs/population.md)."""
 
 
 def run(
@@ -159,11 +155,7 @@ def _say_trust(root: Path, study: Study) -> None:
     from studies.sweep.load import load_runs
 
     runs, _ = load_runs(root, study)
-    hanging = {run.case.scene.name for run in runs if load_of(run.case.scene) == "sag"}
     for verdict in verdicts(runs):
-        if verdict.trusted and verdict.scene in hanging:
-            say(f"{verdict.scene}: trust its best body: {HANGING}; {verdict.why}")
-            continue
         answer = "yes" if verdict.trusted else "no: use more nodes"
         say(f"{verdict.scene}: trust its best body: {answer}, because {verdict.why}")
 

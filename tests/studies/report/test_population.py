@@ -77,17 +77,13 @@ def test_where_nothing_is_compared_nothing_is_judged():
     assert judgements(runs) == []
 
 
-def test_a_wider_share_trusts_more():
-    found = judgements(bad_and_good(), share=100.0)
-    assert all(one.trusted for one in found) and tally(found) == (2, 0, 3, 0)
-
-
-def test_even_and_odd_members_are_counted_apart():
-    rows = trust_of(bad_and_good()).splitlines()[2:]
-    assert rows == [
-        "| 994 and 1,194 nodes, members of even number | 3 | 1 | 1 | 2 | 1 |",
-        "| 994 and 1,194 nodes, members of odd number | 2 | 1 | 0 | 1 | 0 |",
+def test_the_members_on_which_the_rule_was_chosen_are_counted_apart():
+    runs = [*bad_and_good(), *(member(30, body, bend, force) for body, force in ((COARSE, 2.6), (FINE, 2.3)))]
+    assert trust_of(runs).splitlines()[2:] == [
+        "| liver | 994 and 1,194 | 2, 1 | 3, 1 | 1, 1 | 0, 0 |",
+        "| all | all | 2, 1 | 3, 1 | 1, 1 | 0, 0 |",
     ]
+    assert trust_of(bad_and_good()).splitlines()[-1] == "| all | all | 2, 1 | 3, 1 | – | – |"
     assert "No results" in trust_of([])
 
 
