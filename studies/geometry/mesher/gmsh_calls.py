@@ -72,8 +72,10 @@ class Remesher:
         self.regions: list[Region] = []
 
     def finer_in(self, regions: list[Region]) -> None:
-        """From now on edges in the regions are half as long as elsewhere."""
+        """From now on edges in the regions are half as long as elsewhere; without regions no more."""
         self.regions = regions
+        if not regions:
+            gmsh.model.mesh.removeSizeCallback()
 
     def mesh(self, size: float) -> tuple[np.ndarray, np.ndarray]:
         """Points (n, 3) [m] near the surface and outward triangles (t, 3) with edges of length `size` [m]."""

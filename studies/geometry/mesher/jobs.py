@@ -52,7 +52,16 @@ def mesh_from(
     given = arrays or {}
     parts = (*PARTS, "losses") if recipe["kind"] == "scan" else PARTS
     parts = (*parts, *cuts_of(recipe))
-    return to_mesh(recipe, cached(recipe, given, parts, lambda: run_worker(recipe, given, limit)))
+    return to_mesh(recipe, cached(recipe, given, parts, lambda: run_worker(recipe, given | surface_of(recipe), limit)))
+
+
+def surface_of(recipe: dict[str, Any]) -> dict[str, np.ndarray]:
+    """Points and triangles of the surface that the recipe of an organ fills, where the cache has them."""
+    if recipe["kind"] != "organ" or not recipe["fill"] or cuts_of(recipe):
+        return {}
+    alone = {key: value for key, value in recipe.items() if key != "layers"} | {"fill": False}
+    surface = read_cached(cache_path(alone, {}), PARTS)
+    return {} if surface is None else {part: surface[part] for part in ("points", "triangles")}
 
 
 def cuts_of(recipe: dict[str, Any]) -> dict[str, dict[str, Any]]:
@@ -73,8 +82,7 @@ def cached(
     make: Callable[[], dict[str, np.ndarray]],
 ) -> dict[str, np.ndarray]:
     """The arrays called `parts` for a recipe: from the cache, or made and stored there."""
-    name = recipe["name"].encode()[:NAME_BYTES].decode(errors="ignore")
-    path = cache_folder() / f"{name}-{recipe_hash(recipe, arrays)}.npz"
+    path = cache_path(recipe, arrays)
     result = read_cached(path, parts)
     if result is None:
         result = make()
@@ -114,6 +122,12 @@ def cache_folder() -> Path:
     if given:
         return Path(given)
     return results / "cache" / "meshes" if results.is_dir() else user_cache() / "meshes"
+
+
+def cache_path(recipe: dict[str, Any], arrays: dict[str, np.ndarray]) -> Path:
+    """Where the cache keeps what is made by a recipe."""
+    name = recipe["name"].encode()[:NAME_BYTES].decode(errors="ignore")
+    return cache_folder() / f"{name}-{recipe_hash(recipe, arrays)}.npz"
 
 
 def recipe_hash(recipe: dict[str, Any], arrays: dict[str, np.ndarray]) -> str:

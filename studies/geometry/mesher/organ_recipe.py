@@ -24,7 +24,8 @@ from studies.geometry.surface.volume import with_volume
 
 
 def build(recipe: dict[str, Any], arrays: Arrays) -> Arrays:
-    """The arrays of jobs.PARTS for a recipe; `arrays` holds a given surface for kind "fill".
+    """The arrays of jobs.PARTS for a recipe; `arrays` holds a given surface for kind "fill", and for kind "organ" the
+    one that was made before by the same recipe without "fill".
 
     Raises StudyError when the recipe cannot be made.
     """
@@ -33,7 +34,10 @@ def build(recipe: dict[str, Any], arrays: Arrays) -> Arrays:
 
 def build_organ(recipe: dict[str, Any], arrays: Arrays) -> Arrays:
     """An organ of SHAPES with `nodes` surface nodes, its outlines of regions snapped, filled when asked."""
-    return mesh_shape(make_shape(recipe["organ"], recipe["parameters"]), recipe)
+    shape = make_shape(recipe["organ"], recipe["parameters"])
+    if arrays:
+        return finish(shape, arrays["points"], arrays["triangles"], recipe)
+    return mesh_shape(shape, recipe)
 
 
 def mesh_shape(shape: Shape, recipe: dict[str, Any]) -> Arrays:

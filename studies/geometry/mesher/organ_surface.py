@@ -1,7 +1,5 @@
 """The surface of an organ with a wanted number of nodes: evenly spread, or where its shape needs them."""
 
-from collections.abc import Callable
-
 import numpy as np
 
 from studies.base.errors import StudyError
@@ -30,24 +28,30 @@ def close_surface(shape: Shape, nodes: int, regions: list[Region], curved: bool)
 
     Raises StudyError when none is well shaped."""
     truth = first_surface(shape)
-    best = Fit(shape, even_surface(shape, nodes, regions), regions, truth, curved)
-    badness = best.badness()
-    for spare in SPARES:
-        if badness <= 1.0:
-            break
-        stage(f"a surface of {nodes} nodes that follows its shape")
-        made = follow(shape, nodes, regions, truth, curved, spare)
-        if made is not None and made.badness() < badness:
-            best, badness = made, made.badness()
+    with fresh_model():
+        remesher = Remesher(*truth)
+        best = Fit(shape, even(shape, nodes, regions, remesher, truth), regions, truth, curved)
+        badness = best.badness()
+        for spare in SPARES:
+            if badness <= 1.0:
+                break
+            stage(f"a surface of {nodes} nodes that follows its shape")
+            made = follow(shape, nodes, regions, remesher, truth, curved, spare)
+            if made is not None and made.badness() < badness:
+                best, badness = made, made.badness()
     return best.surface
 
 
-def follow(shape: Shape, nodes: int, regions: list[Region], truth: Surface, curved: bool, spare: float) -> Fit | None:
+def follow(
+    shape: Shape, nodes: int, regions: list[Region], remesher: Remesher, truth: Surface, curved: bool, spare: float
+) -> Fit | None:
     """A surface of which the share `spare` of its nodes is where its shape needs them; None where edges stay too long
     for one of the regions."""
     for finer in ([], regions):
         try:
-            base = base_surface(shape, truth, max(FEWEST, nodes - min(round(spare * nodes), MOST_SPARE)), finer)
+            base = base_surface(
+                shape, remesher, truth, max(FEWEST, nodes - min(round(spare * nodes), MOST_SPARE)), finer
+            )
             made = fitted(shape, base, nodes, regions, truth, curved)
         except StudyError:
             # Not lost: shorter edges in the regions, another share or the even surface follow.
@@ -57,47 +61,50 @@ def follow(shape: Shape, nodes: int, regions: list[Region], truth: Surface, curv
     return None
 
 
-def base_surface(shape: Shape, start: Surface, nodes: int, finer: list[Region]) -> Surface:
-    """An even surface with `nodes` nodes and no outline, its edges half as long in the regions `finer`.
+def base_surface(shape: Shape, remesher: Remesher, start: Surface, nodes: int, finer: list[Region]) -> Surface:
+    """An even surface with `nodes` nodes and no outline, its edges half as long in the regions `finer`; remesher: of
+    `start`, a fine surface.
 
     Raises StudyError when none is well shaped."""
-    area = float(triangle_areas(*start).sum())
-    with fresh_model():
-        remesher = Remesher(*start)
-        if finer:
-            remesher.finer_in(finer)
-        points, triangles = well_shaped(shape, start, nodes, area, remesher.mesh)
+    remesher.finer_in(finer)
+    points, triangles = well_shaped(shape, start, nodes, remesher)
     fixed = np.zeros(len(points), bool)
     return relax(shape, points, triangles, None, fixed, fixed), triangles
 
 
 def even_surface(shape: Shape, nodes: int, regions: list[Region]) -> Surface:
-    """An even surface with `nodes` nodes and every region's outline on its edges.
-
-    Where edges are too long for a region, the surface is meshed again with edges half as long in the regions.
-    """
-    stage(f"a surface of {nodes} nodes")
-    start_points, start_triangles = first_surface(shape)
-    area = float(triangle_areas(start_points, start_triangles).sum())
-    for region in regions:
-        region.level(start_points[:1])  # a region that is none is refused here, not inside the mesher
+    """An even surface with `nodes` nodes and every region's outline on its edges."""
+    start = first_surface(shape)
     with fresh_model():
-        remesher = Remesher(start_points, start_triangles)
-        start = start_points, start_triangles
-        surface = snap_if_it_fits(shape, *well_shaped(shape, start, nodes, area, remesher.mesh), regions)
-        if surface is None:
-            remesher.finer_in(regions)
-            surface = snap_all(shape, *surface_with(nodes, area, remesher.mesh, shape), regions)
+        return even(shape, nodes, regions, Remesher(*start), start)
+
+
+def even(shape: Shape, nodes: int, regions: list[Region], remesher: Remesher, start: Surface) -> Surface:
+    """The same by the remesher of `start`, a fine surface.
+
+    Where edges are too long for a region, the surface is meshed again with edges half as long in the regions."""
+    stage(f"a surface of {nodes} nodes")
+    for region in regions:
+        region.level(start[0][:1])  # a region that is none is refused here, not inside the mesher
+    surface = snap_if_it_fits(shape, *well_shaped(shape, start, nodes, remesher), regions)
+    if surface is None:
+        remesher.finer_in(regions)
+        surface = snap_all(shape, *surface_with(nodes, area_of(start), remesher.mesh, shape), regions)
     return surface
 
 
-def well_shaped(shape: Shape, start: Surface, nodes: int, area: float, mesh_at: Callable[[float], Surface]) -> Surface:
-    """An even surface of `nodes` nodes by `mesh_at`; where it makes none, by MMG from the first triangulation."""
+def area_of(surface: Surface) -> float:
+    """[m²]."""
+    return float(triangle_areas(*surface).sum())
+
+
+def well_shaped(shape: Shape, start: Surface, nodes: int, remesher: Remesher) -> Surface:
+    """An even surface of `nodes` nodes by the remesher of `start`; where it makes none, by MMG from `start`."""
     try:
-        return surface_with(nodes, area, mesh_at, shape)
+        return surface_with(nodes, area_of(start), remesher.mesh, shape)
     except StudyError:
         # Not lost: MMG makes one, or gives a sentence of the same kind.
-        return surface_with(nodes, area, EvenRemesher(*start, NEARNESS).mesh, shape)
+        return surface_with(nodes, area_of(start), EvenRemesher(*start, NEARNESS).mesh, shape)
 
 
 def snap_if_it_fits(shape: Shape, points: np.ndarray, triangles: np.ndarray, regions: list[Region]) -> Surface | None:

@@ -1,6 +1,7 @@
 """Smooth building blocks for level functions: any unit of length, as long as it is one."""
 
 from collections.abc import Sequence
+from functools import lru_cache
 from math import comb
 
 import numpy as np
@@ -58,11 +59,16 @@ def canal(x: np.ndarray, spheres: Sequence[Sphere]) -> np.ndarray:
     smooth when the last control sphere lies well inside the one before it (`closed` adds such spheres).
     Monge, Application de l'analyse a la geometrie, 1807.
     """
+    table = _table(tuple(spheres))
+    return np.concatenate([np.empty(0), *(_nearest(part, table) for part in _parts(np.asarray(x, float)))])
+
+
+@lru_cache
+def _table(spheres: tuple[Sphere, ...]) -> np.ndarray:
+    """Coefficients of s^0, s^1, ... of (c, r)(s) and of its first two derivatives, (k, 12)."""
     rows = _powers(np.asarray(spheres, float))
     first = _derivative(rows)
-    second = _derivative(first)
-    table = np.hstack([rows, first, second])
-    return np.concatenate([np.empty(0), *(_nearest(part, table) for part in _parts(np.asarray(x, float)))])
+    return np.hstack([rows, first, _derivative(first)])
 
 
 def _parts(x: np.ndarray) -> list[np.ndarray]:

@@ -17,30 +17,72 @@ class SurfaceDistance:
         centroids = self.corners.mean(axis=1)
         self.reach = np.linalg.norm(self.corners - centroids[:, None], axis=2).max()
         self.tree = KDTree(centroids)
-        self.known: dict[bytes, float] = {}
 
     def __call__(self, queries: np.ndarray) -> np.ndarray:
         """Distance [m] of each of `queries` (q, 3), (q,)."""
-        found, total = np.empty(len(queries)), len(self.corners)
+        return self.nearest(queries)[0]
+
+    def nearest(self, queries: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Distance [m] of each of `queries` (q, 3), and the number of its nearest triangle, both (q,)."""
+        distance, nearest, total = np.empty(len(queries)), np.empty(len(queries), np.int64), len(self.corners)
         pending, count = np.arange(len(queries)), min(CANDIDATES, total)
         while len(pending):
             away, near = (a.reshape(len(pending), -1) for a in self.tree.query(queries[pending], k=count))
-            found[pending] = _to_triangles(queries[pending], self.corners, near)
+            distance[pending], nearest[pending] = _to_triangles(queries[pending], self.corners, near)
             if count == total:
                 break
             # A triangle not looked at has its centroid beyond the last one's, and no point nearer than that less reach.
-            pending = pending[away[:, -1] - self.reach < found[pending]]
+            pending = pending[away[:, -1] - self.reach < distance[pending]]
             count = min(2 * count, total)
-        return found
+        return distance, nearest
 
-    def again(self, queries: np.ndarray) -> np.ndarray:
-        """The same; what the call before asked for too, to the bit, is not measured again."""
-        keys = np.ascontiguousarray(queries, float).view("V24").ravel().tolist()
-        new = [k for k, key in enumerate(keys) if key not in self.known]
-        measured = dict(zip([keys[k] for k in new], self(queries[new]).tolist(), strict=True)) if new else {}
-        found = [self.known[key] if key in self.known else measured[key] for key in keys]
-        self.known = dict(zip(keys, found, strict=True))
-        return np.array(found)
+
+class ChangingFacets:
+    """Distances between a fixed surface and one of which few facets change from call to call, in both directions."""
+
+    def __init__(self, points: np.ndarray, triangles: np.ndarray):
+        """points (n, 3) [m] and triangles (f, 3) of the fixed surface."""
+        self.samples, self.fixed = points, SurfaceDistance(points, triangles)
+        self.rows: dict[bytes, int] = {}
+        self.ahead, self.owner = np.empty(len(points)), np.full(len(points), -1)
+        self.behind: np.ndarray | None = None
+
+    def measure(self, places: np.ndarray, pieces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Distances [m] of the points (n,) of the fixed surface to the other one, and of its places (t, p) to the
+        fixed surface. They are those of SurfaceDistance to the bit.
+
+        places: on t facets, (t, p, 3) [m]; pieces: flat triangles between those of one facet, (k, 3).
+        """
+        keys = [facet.tobytes() for facet in places]
+        before = np.array([self.rows.get(key, -1) for key in keys])
+        new, kept = np.flatnonzero(before < 0), np.flatnonzero(before >= 0)
+        behind = np.empty(places.shape[:2])
+        if self.behind is not None:
+            behind[kept] = self.behind[before[kept]]
+        behind[new] = self.fixed(places[new].reshape(-1, 3)).reshape(len(new), places.shape[1])
+        # Row of each facet of the last call among these; -1 of one that is gone.
+        after = np.full(len(self.rows) + 1, -1)
+        after[before[kept]] = kept
+        owner, ahead = after[self.owner], self.ahead.copy()
+        lost = np.flatnonzero(owner < 0)
+        if len(lost):
+            ahead[lost], piece = SurfaceDistance(*_apart(places, pieces)).nearest(self.samples[lost])
+            owner[lost] = piece // len(pieces)
+        if len(new) and len(lost) < len(owner):
+            changed = SurfaceDistance(*_apart(places[new], pieces))
+            near = np.flatnonzero(changed.tree.query(self.samples)[0] - changed.reach < ahead)
+            away, piece = changed.nearest(self.samples[near])
+            nearer = away < ahead[near]
+            ahead[near[nearer]], owner[near[nearer]] = away[nearer], new[piece[nearer] // len(pieces)]
+        self.rows = {key: k for k, key in enumerate(keys)}
+        self.ahead, self.owner, self.behind = ahead, owner, behind
+        return ahead, behind
+
+
+def _apart(places: np.ndarray, pieces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Points (t p, 3) and triangles (t k, 3) of facets that share no point."""
+    first = places.shape[1] * np.arange(len(places))
+    return places.reshape(-1, 3), (pieces + first[:, None, None]).reshape(-1, 3)
 
 
 def distance_to_surface(queries: np.ndarray, points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
@@ -48,14 +90,15 @@ def distance_to_surface(queries: np.ndarray, points: np.ndarray, triangles: np.n
     return SurfaceDistance(points, triangles)(queries)
 
 
-def _to_triangles(queries: np.ndarray, corners: np.ndarray, near: np.ndarray) -> np.ndarray:
-    """Smallest distance [m] of each query (q, 3) to its triangles `near` (q, k) of `corners` (f, 3, 3), (q,)."""
+def _to_triangles(queries: np.ndarray, corners: np.ndarray, near: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Smallest distance [m] of each query (q, 3) to its triangles `near` (q, k) of `corners` (f, 3, 3), and the number
+    of that triangle, both (q,)."""
     # Loaded where it is used: what compiles takes half a second to import.
     from studies.geometry.surface.triangle_distance import nearest_into
 
-    found = np.empty(len(queries))
-    nearest_into(np.ascontiguousarray(queries, float), corners, near, np.empty((3, 3)), found)
-    return np.sqrt(found)
+    squared, nearest = np.empty(len(queries)), np.empty(len(queries), np.int64)
+    nearest_into(np.ascontiguousarray(queries, float), corners, near, np.empty((3, 3)), squared, nearest)
+    return np.sqrt(squared), nearest
 
 
 def hausdorff(points_a: np.ndarray, triangles_a: np.ndarray, points_b: np.ndarray, triangles_b: np.ndarray) -> float:

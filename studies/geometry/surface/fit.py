@@ -10,11 +10,12 @@ from studies.geometry.mesh.organ_mesh import triangle_areas, triangle_normals, u
 from studies.geometry.mesh.quality import triangle_radius_ratio
 from studies.geometry.shape.levelset import Shape
 from studies.geometry.shape.regions import Region
-from studies.geometry.surface.distance import SurfaceDistance
+from studies.geometry.surface.distance import ChangingFacets
 from studies.geometry.surface.edit import flip_edges, split_edge
 from studies.geometry.surface.intersections import crossing_triangles
 from studies.geometry.surface.sides import (
     along_facets,
+    lattice,
     outline_edges,
     places_on,
     region_area,
@@ -80,9 +81,9 @@ class Fit:
         self.size = float(np.linalg.norm(np.ptp(truth[0], axis=0)))
 
     @cached_property
-    def from_truth(self) -> SurfaceDistance:
-        """Distances to the true surface."""
-        return SurfaceDistance(*self.truth)
+    def gaps(self) -> ChangingFacets:
+        """Distances between the true surface and this one."""
+        return ChangingFacets(*self.truth)
 
     def deviation(self) -> float:
         """Largest distance between the surface and its shape, in either direction, over the size [1]."""
@@ -105,9 +106,10 @@ class Fit:
 
     def distances(self) -> tuple[tuple[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]:
         """Places (m, 3) [m] on the true surface and their distances (m,) [m] to this one, and the reverse."""
-        places, pieces = along_facets(*with_middles(self.shape, self.points, self.triangles, self.regions, self.curved))
-        samples = self.truth[0]
-        return (samples, SurfaceDistance(places, pieces)(samples)), (places, self.from_truth.again(places))
+        points, facets = with_middles(self.shape, self.points, self.triangles, self.regions, self.curved)
+        places = along_facets(points, facets)[0].reshape(len(facets), -1, 3)
+        ahead, behind = self.gaps.measure(places, lattice()[1])
+        return (self.truth[0], ahead), (places.reshape(-1, 3), behind.ravel())
 
     def grow(self, nodes: int) -> None:
         """Adds nodes until there are `nodes`, or until none of the farthest places takes one."""

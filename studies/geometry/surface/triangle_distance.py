@@ -52,15 +52,25 @@ def edges_into(triangle: np.ndarray, u: np.ndarray, v: np.ndarray, n: np.ndarray
 
 
 @compiled
-def nearest_into(queries: np.ndarray, corners: np.ndarray, near: np.ndarray, scratch: np.ndarray, found: np.ndarray):
-    """found (q,): squared distance of each of `queries` (q, 3) to the nearest of its triangles `near` (q, k) among
-    corners (f, 3, 3); scratch (3, 3)."""
+def nearest_into(
+    queries: np.ndarray,
+    corners: np.ndarray,
+    near: np.ndarray,
+    scratch: np.ndarray,
+    squared: np.ndarray,
+    nearest: np.ndarray,
+):
+    """squared (q,): squared distance of each of `queries` (q, 3) to the nearest of its triangles `near` (q, k) among
+    corners (f, 3, 3), whose number is nearest (q,); scratch (3, 3)."""
     u, v, n = scratch
     for q in range(len(queries)):
-        found[q] = np.inf
+        squared[q] = np.inf
         for f in near[q]:
             edges_into(corners[f], u, v, n)
-            found[q] = min(found[q], squared_to_triangle(queries[q], corners[f], u, v, n))
+            away = squared_to_triangle(queries[q], corners[f], u, v, n)
+            if away < squared[q]:
+                squared[q] = away
+                nearest[q] = f
 
 
 @compiled
