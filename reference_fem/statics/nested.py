@@ -121,8 +121,8 @@ def continued(system: System, state: State) -> State:
     outlines of held regions the strain grows with each refinement, beyond what one step can follow.
     """
     x = repaired(system, state.x)
-    as_it_presses = multipliers(system, x, state.t, state.pressure)
-    state = replace(state, x=x, multiplier=as_it_presses, pressure=as_it_presses)
+    multiplier = multipliers(system, x, state.t, state.pressure)
+    state = replace(state, x=x, multiplier=multiplier, pressure=multiplier)
     try:
         return solve_step(system, state, state.t, state.load)
     except StepFailed:

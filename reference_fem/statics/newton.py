@@ -51,6 +51,8 @@ def solve_step(system: System, state: State, t: float, load: float, more: np.nda
     force, filling = system.force_at(t, load) + more, system.filling_at(t, load)
     loads = Loads(force, system.obstacles_at(t), state.pressure, filling, grip=state.hold, faces=state.face_pressure)
     x, found, before = state.x, first_guess(system, state, loads), None
+    if not found.usable:
+        raise StepFailed("an element of the state that the step starts from is inverted")
     for iteration in range(1, system.settings.max_iterations + 1):
         change, guess, face_guess = direction(system, found, x, target)
         grip = let_go(loads.grip, guess) if iteration > HESITATION else loads.grip

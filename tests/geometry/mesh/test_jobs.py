@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from studies.base.errors import StudyError
-from studies.geometry import HalfSpace, ball, fill
+from studies.geometry import HalfSpace, ball, fill, organ
 from studies.geometry.mesher import jobs, process
 from studies.geometry.mesher.jobs import mesh_from, recipe_hash
 
@@ -39,6 +39,23 @@ def test_the_second_time_nothing_is_made(own_cache, monkeypatch):
     first = ball(150)
     monkeypatch.setattr(jobs, "run_worker", lambda *_: pytest.fail("meshed again"))
     assert same(ball(150), first)
+
+
+@pytest.mark.parametrize(("name", "nodes"), [("ball", 100), ("stomach", 150)])
+def test_a_surface_made_before_is_filled_as_if_made_now(own_cache, monkeypatch, name, nodes):
+    """It is not made again for what fills it, to the bit, be the organ solid or hollow."""
+    alone = organ(name, nodes, sides="straight")
+    monkeypatch.setenv("ORGANBENCH_CACHE", str(own_cache / "other"))
+    surface, run_worker, given = organ(name, nodes, fill=False, sides="straight"), jobs.run_worker, []
+
+    def seen(recipe, arrays, limit):
+        given.append(sorted(arrays))
+        return run_worker(recipe, arrays, limit)
+
+    monkeypatch.setattr(jobs, "run_worker", seen)
+    filled = organ(name, nodes, sides="straight")
+    assert given == [["points", "triangles"]] and same(filled, alone)
+    assert (filled.points[: filled.outer_count] == surface.points).all()
 
 
 def test_a_damaged_cache_file_is_made_again_and_said(own_cache):

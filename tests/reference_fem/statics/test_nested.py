@@ -26,7 +26,7 @@ from reference_fem.statics.newton import StepFailed, solve_step
 from reference_fem.system import assembly
 from reference_fem.system.saddle_point import System
 from tests.reference_fem.bodies import ball_octant, block, symmetry
-from tests.reference_fem.statics.test_cavity import hollow_cube, in_the_middle
+from tests.reference_fem.statics.test_cavity import closed_problem, hollow_cube, in_the_middle
 
 DEEP = 0.2
 """How far the plane goes in, over the radius."""
@@ -260,6 +260,16 @@ def test_the_missing_forces_hold_a_carried_state_as_it_is(straight):
     upside_down = state.x.copy()
     upside_down[2 : systems[1].displacement_count : 3] -= 2.5 * nodes(fine)[:, 2]
     assert unbalanced(systems[1], replace(state, x=upside_down)) is None
+
+
+@pytest.mark.parametrize("body", ["solid", "hollow"])
+def test_a_step_from_an_inverted_element_fails_as_one_that_a_shorter_one_may_replace(body):
+    """Of a closed lumen NumPy's own error came through, and the reference was lost."""
+    system = System(heavy(block((2, 2, 2))) if body == "solid" else closed_problem(), NewtonSettings())
+    state = system.rest()
+    state.x[2 : system.displacement_count : 3] -= 2.5 * nodes(system.problem.mesh)[:, 2]
+    with pytest.raises(StepFailed, match="inverted"):
+        solve_step(system, state, 1.0, 1.0)
 
 
 def inverted(system, x):

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy.spatial import KDTree
 
 from studies.geometry import ball
-from studies.geometry.surface.distance import SurfaceDistance, distance_to_surface, hausdorff
+from studies.geometry.surface.distance import ChangingFacets, SurfaceDistance, distance_to_surface, hausdorff
 from tests.studies.tiny import cube
 
 TRIANGLE = np.array([[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [0.0, 3.0, 0.0]])
@@ -110,14 +110,41 @@ def test_shifted_planes_and_symmetry():
     assert distance_to_surface(points[np.unique(triangles)], spike, triangles).max() < 0.5 * ways[0]
 
 
-def test_what_was_asked_for_before_is_not_measured_again(monkeypatch):
-    """Nor mistaken for its neighbour by one rounding."""
+def soup(random, facets):
+    """Facets without a common point: places (t, 6, 3) at corners and middles, and the four flat pieces of one."""
+    centres = random.uniform(-1.0, 1.0, (facets, 1, 3))
+    corners = centres + random.uniform(-0.3, 0.3, (facets, 3, 3))
+    return np.concatenate([corners, 0.5 * (corners + np.roll(corners, -1, axis=1))], axis=1)
+
+
+PIECES = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]])
+
+
+@settings(deadline=None, max_examples=50)
+@given(st.integers(0, 2**32 - 1))
+def test_distances_of_changing_facets_are_the_same_to_the_bit(seed):
+    """Facets come, go, change places in the list, and move by one rounding."""
+    random = np.random.default_rng(seed)
     points, triangles, _ = cube()
-    surface, measured, measure = SurfaceDistance(points, triangles), [], SurfaceDistance.__call__
-    queries = np.random.default_rng(2).uniform(-1.0, 2.0, (60, 3))
-    monkeypatch.setattr(SurfaceDistance, "__call__", lambda self, q: measured.append(len(q)) or measure(self, q))
-    moved = queries.copy()
-    moved[::3, 1] = np.nextafter(moved[::3, 1], 9.0)
-    for asked in (queries, moved, moved, queries):
-        np.testing.assert_array_equal(surface.again(asked), measure(SurfaceDistance(points, triangles), asked))
-    assert measured == [60, 20, 20]
+    changing, places = ChangingFacets(points, triangles), soup(random, 30)
+    for _ in range(6):
+        ahead, behind = changing.measure(places, PIECES)
+        whole = places.reshape(-1, 3), np.concatenate([6 * k + PIECES for k in range(len(places))])
+        np.testing.assert_array_equal(ahead, SurfaceDistance(*whole)(points))
+        np.testing.assert_array_equal(behind.ravel(), SurfaceDistance(points, triangles)(whole[0]))
+        kept = random.permutation(len(places))[: random.integers(1, 30)]
+        places = np.concatenate([places[kept], soup(random, random.integers(0, 6))])
+        places[0, 1] = np.nextafter(places[0, 1], 9.0)
+
+
+def test_facets_that_stay_are_not_measured_again(monkeypatch):
+    points, triangles, _ = cube()
+    changing, places = ChangingFacets(points, triangles), soup(np.random.default_rng(2), 40)
+    measured, nearest = [], SurfaceDistance.nearest
+    monkeypatch.setattr(SurfaceDistance, "nearest", lambda self, q: measured.append(len(q)) or nearest(self, q))
+    changing.measure(places, PIECES)
+    assert measured == [40 * 6, len(points)]
+    changing.measure(places, PIECES)
+    assert measured[2:] == [0]
+    changing.measure(places[1:], PIECES)
+    assert measured[3] == 0 and sum(measured[4:]) < len(points)
