@@ -186,10 +186,11 @@ def _base_mesh(scene: Scene, surface_nodes: int, at_contact: int) -> NestedMesh:
 def small_at_outlines(body: HeldMesh, points: np.ndarray, least: float) -> np.ndarray:
     """Elements with a vertex on an outline or the front of a cut whose halves would have edges shorter than `least` [m]
     if their vertices were at `points` (n, 3) [m], (ne,) bool."""
-    edge = edges_of(points, body.mesh.t.T) * 0.5 ** (1 / 3)
+    small = edges_of(points, body.mesh.t.T) * 0.5 ** (1 / 3) < least
     there = np.zeros(body.mesh.nelements, dtype=bool)
-    there[body.at_outlines()] = True
-    return there & (edge < least)
+    if small.any():  # finding what is at outlines takes longer
+        there[body.at_outlines()] = True
+    return there & small
 
 
 def edges_of(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
