@@ -6,7 +6,6 @@ from massspring import Free, ImplicitVolume
 from studies.catalog.accuracy import FINEST, LONG, even, graded
 from studies.catalog.study import Chart, Study
 from studies.runs.case import BodyRecipe, Case
-from studies.scene.kind import load_of
 from studies.scene.scene import Scene
 
 RECORDED = ("surface",)
@@ -14,8 +13,8 @@ RECORDED = ("surface",)
 
 def study_of(scene: Scene) -> Study:
     """Springs alone, one kept volume, and quadratic elements on two meshes in `scene`, with charts and a recorded
-    surface. The study has the name of the scene. Where the two meshes differ, neither is to be trusted; of an organ
-    that hangs that is not enough, and the finer one has FINEST nodes (studies.metrics.trust)."""
+    surface. The study has the name of the scene. Where the two meshes differ, neither is to be trusted; with fewer than
+    FINEST nodes that they agree says too little (studies.metrics.trust)."""
     cases = (
         Case(scene, BodyRecipe(), Free(), recorded=RECORDED),
         Case(scene, BodyRecipe(), ImplicitVolume(), recorded=RECORDED),
@@ -31,6 +30,5 @@ def study_of(scene: Scene) -> Study:
 
 def _two_meshes(scene: Scene) -> tuple[BodyRecipe, ...]:
     bodies = graded(scene)
-    if bodies and load_of(scene) == "sag":
-        bodies = (*bodies, replace(bodies[-1], nodes=FINEST))
-    return (bodies or even(scene))[-2:]
+    finest = tuple(replace(body, nodes=FINEST) for body in bodies[-1:])
+    return (*bodies, *finest)[-2:] or even(scene)[-2:]

@@ -121,22 +121,21 @@ def trust_of(runs: Sequence[Run]) -> str:
     if not comparisons:
         return NONE
     lines = [
-        "| organ | nodes of the two meshes | chosen on: beyond the target, named | within it, doubted "
+        "| organ | chosen on: beyond the target, named | within it, doubted "
         "| judged on: beyond the target, named | within it, doubted |",
-        "|---|---|---|---|---|---|",
+        "|---|---|---|---|---|",
     ]
-    pairs: dict[str, list[Judgement]] = {}
+    organs: dict[str, list[Judgement]] = {}
     for one in comparisons:
-        words = f"{_organ(one)} | {one.nodes[0]:,} and {one.nodes[1]:,}"
-        pairs.setdefault(words, []).append(one)
-    for words, some in [*pairs.items(), ("all | all", comparisons)]:
+        organs.setdefault(_organ(one), []).append(one)
+    for organ, some in [*organs.items(), ("all", comparisons)]:
         earlier = [one for one in some if _number_of(one) < CHOSEN_ON.get(_organ(one), 0)]
         later = [one for one in some if one not in earlier]
         cells = []
         for part in (earlier, later):
             count = tally(part)
             cells += [f"{count.beyond}, {count.named}", f"{count.within}, {count.doubted}"] if part else ["–", "–"]
-        lines.append(f"| {words} | " + " | ".join(cells) + " |")
+        lines.append(f"| {organ} | " + " | ".join(cells) + " |")
     return "\n".join(lines)
 
 

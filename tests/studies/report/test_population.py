@@ -11,8 +11,8 @@ from studies.runs.case import BodyRecipe, Case
 from studies.store.record import Status
 from tests.studies.made_up_run import POINTS, SCENE, bend, run
 
-FINE = BodyRecipe("quadratic", 1194, graded="adaptive")
-COARSE = replace(FINE, nodes=994)
+FINE = BodyRecipe("quadratic", 1594, graded="adaptive")
+COARSE = replace(FINE, nodes=1194)
 
 
 @pytest.fixture(autouse=True)
@@ -69,6 +69,14 @@ def test_judgements_are_held_against_the_reference():
     assert tally(found) == (2, 1, 3, 1)
 
 
+def test_coarser_meshes_are_not_judged():
+    coarser = [
+        replace(one, case=replace(one.case, body=replace(one.case.body, nodes=one.case.body.nodes - 400)))
+        for one in bad_and_good()
+    ]
+    assert judgements(coarser) == []
+
+
 def test_where_nothing_is_compared_nothing_is_judged():
     runs = [
         replace(one, case=replace(one.case, scene=replace(one.case.scene, quantities=("volume",))))
@@ -80,10 +88,10 @@ def test_where_nothing_is_compared_nothing_is_judged():
 def test_the_members_on_which_the_rule_was_chosen_are_counted_apart():
     runs = [*bad_and_good(), *(member(30, body, bend, force) for body, force in ((COARSE, 2.6), (FINE, 2.3)))]
     assert trust_of(runs).splitlines()[2:] == [
-        "| liver | 994 and 1,194 | 2, 1 | 3, 1 | 1, 1 | 0, 0 |",
-        "| all | all | 2, 1 | 3, 1 | 1, 1 | 0, 0 |",
+        "| liver | 2, 1 | 3, 1 | 1, 1 | 0, 0 |",
+        "| all | 2, 1 | 3, 1 | 1, 1 | 0, 0 |",
     ]
-    assert trust_of(bad_and_good()).splitlines()[-1] == "| all | all | 2, 1 | 3, 1 | – | – |"
+    assert trust_of(bad_and_good()).splitlines()[-1] == "| all | 2, 1 | 3, 1 | – | – |"
     assert "No results" in trust_of([])
 
 
