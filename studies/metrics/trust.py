@@ -90,7 +90,7 @@ class Judgement(NamedTuple):
 def judgements(runs: Sequence[Run]) -> list[Judgement]:
     """Of each scene with a reference and of each two neighbouring sizes of a graded quadratic recipe, the finer with
     ENOUGH nodes."""
-    found = []
+    judged = []
     for coarse, fine in _pairs([run for run in runs if run.reference is not None]):
         if fine.case.body.nodes < ENOUGH:
             continue
@@ -98,11 +98,11 @@ def judgements(runs: Sequence[Run]) -> list[Judgement]:
         wish = usual_wish(scene)
         errors = ((FORCE, wish.force), (DISPLACEMENT, wish.displacement))
         values = [(abs(entry(fine)), bound) for entry, bound in errors if bound is not None]
-        known = [value <= bound for value, bound in values if value == value]
-        if not known:  # nothing says whether it is right
+        right = [value <= bound for value, bound in values if value == value]
+        if not right:  # nothing says whether it is right
             continue
-        found.append(Judgement(scene.name, between, within(between, wish, allowed_share(fine.case)), all(known)))
-    return found
+        judged.append(Judgement(scene.name, between, within(between, wish, allowed_share(fine.case)), all(right)))
+    return judged
 
 
 class Tally(NamedTuple):
@@ -118,9 +118,9 @@ class Tally(NamedTuple):
     """Of these those that are not trusted."""
 
 
-def tally(found: Sequence[Judgement]) -> Tally:
+def tally(judged: Sequence[Judgement]) -> Tally:
     """How many of the bad are named and how many of the good are doubted."""
-    bad, good = [one for one in found if not one.within], [one for one in found if one.within]
+    bad, good = [one for one in judged if not one.within], [one for one in judged if one.within]
     return Tally(len(bad), sum(not one.trusted for one in bad), len(good), sum(not one.trusted for one in good))
 
 
@@ -169,5 +169,5 @@ def allowed_share(case: Case) -> float:
 def within(between: Apart, wish: Wish, share: float) -> bool:
     """Whether two meshes agree to `share` of the wished errors: the error of the finer is likely within them."""
     pairs = ((between.force, wish.force), (between.displacement, wish.displacement))
-    known = [(value, bound) for value, bound in pairs if value == value and bound is not None]
-    return bool(known) and all(value <= share * bound for value, bound in known)
+    compared = [(value, bound) for value, bound in pairs if value == value and bound is not None]
+    return bool(compared) and all(value <= share * bound for value, bound in compared)

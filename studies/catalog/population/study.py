@@ -14,9 +14,9 @@ from studies.scene.scene import Scene
 POPULATION = "population"
 """The study that `organbench run population` brings up to date."""
 MEMBERS = (
-    Population("liver", 27),
-    Population("kidney", 27),
-    Population("stomach", 27),
+    Population("liver", 38),
+    Population("kidney", 38),
+    Population("stomach", 38),
     Population("spleen", 30),
     Population("bladder", 30),
 )
