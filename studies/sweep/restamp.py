@@ -27,7 +27,7 @@ AT_RANDOM = 3
 """Replays of a kind beyond the quickest of each variety."""
 UNREPEATABLE = (Status.FAILED, Status.NOT_CONVERGED, Status.TIMED_OUT)
 """Another run may bring them further: these are run again."""
-MEASURED = ("seconds", "restamped")
+MEASURED = ("seconds", "cut_seconds", "restamped")
 """Attributes that are no result of the case."""
 
 

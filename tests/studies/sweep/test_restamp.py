@@ -15,7 +15,7 @@ from studies.store.ledger import Ledger
 from studies.store.record import Status, peek, read_record, write_record
 from studies.sweep import restamp as module
 from studies.sweep.job import case_jobs
-from studies.sweep.restamp import AT_RANDOM, outdated, restamp, sample
+from studies.sweep.restamp import AT_RANDOM, _odd_attribute, outdated, restamp, sample
 from tests.studies.octant import SCENE
 from tests.studies.tiny import tiny_case, tiny_study
 
@@ -93,6 +93,14 @@ def test_one_difference_and_nothing_is_restamped(old, organbench, tiny_file, spo
     code, out, _ = organbench("restamp", tiny_file, "--results", old)
     assert code == 1 and "not restamped" in out and sentence in out
     assert {file: file.read_bytes() for file in (old / "tiny").iterdir()} == before
+
+
+def test_the_time_that_a_cut_took_is_no_result(old):
+    """Two runs never take the same: records of cuts were never restamped."""
+    record = read_record(paths(old)[0])
+    changed = {**record.attributes, "cut_seconds": 0.1, "seconds": 2.0}
+    assert _odd_attribute({**record.attributes, "cut_seconds": 0.2}, changed) is None
+    assert _odd_attribute(record.attributes, {**changed, "dt": 1.0}) is not None
 
 
 def test_a_dry_run_says_how_many_and_changes_nothing(old, organbench, tiny_file):
