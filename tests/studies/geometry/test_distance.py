@@ -120,7 +120,7 @@ def soup(random, facets):
 PIECES = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]])
 
 
-@settings(deadline=None, max_examples=50)
+@settings(deadline=None, max_examples=20)
 @given(st.integers(0, 2**32 - 1))
 def test_distances_of_changing_facets_are_the_same_to_the_bit(seed):
     """Facets come, go, change places in the list, and move by one rounding."""
