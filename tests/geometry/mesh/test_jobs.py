@@ -41,7 +41,7 @@ def test_the_second_time_nothing_is_made(own_cache, monkeypatch):
     assert same(ball(150), first)
 
 
-@pytest.mark.parametrize(("name", "nodes"), [("ball", 100), ("stomach", 100)])
+@pytest.mark.parametrize(("name", "nodes"), [("ball", 100), ("stomach", 300)])
 def test_a_surface_made_before_is_filled_as_if_made_now(own_cache, monkeypatch, name, nodes):
     """It is not made again for what fills it, to the bit, be the organ solid or hollow."""
     alone = organ(name, nodes)
