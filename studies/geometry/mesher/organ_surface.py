@@ -80,7 +80,7 @@ def even_surface(shape: Shape, nodes: int, regions: list[Region]) -> Surface:
 
 
 def even(shape: Shape, nodes: int, regions: list[Region], remesher: Remesher, start: Surface) -> Surface:
-    """The same by the remesher of `start`, a fine surface.
+    """An even surface with `nodes` nodes and every region's outline on its edges; remesher: of `start`, a fine surface.
 
     Where edges are too long for a region, the surface is meshed again with edges half as long in the regions."""
     stage(f"a surface of {nodes} nodes")
@@ -94,7 +94,7 @@ def even(shape: Shape, nodes: int, regions: list[Region], remesher: Remesher, st
 
 
 def area_of(surface: Surface) -> float:
-    """[m²]."""
+    """The area of a surface [m²]."""
     return float(triangle_areas(*surface).sum())
 
 
