@@ -8,16 +8,22 @@ from weakref import WeakValueDictionary
 
 import numpy as np
 from scipy.spatial import KDTree
-from skfem import MeshTet2
+from skfem import ElementTetP2, MeshTet2
 
 from reference_fem import Evaluator, facet_nodes, surface_triangles
+from reference_fem.elements.shapes import basis_table
 from studies.scene.cut import nearest_cut, normals_at, sides_of
 from studies.scene.scene import Scene
 from studies.store.record import Record
 
 
 class _Remembering(Evaluator):
-    """Finds the same points in its mesh once: all runs on a mesh, and several quantities of each, ask for them."""
+    """Finds the same points in its mesh once: all runs on a mesh, and several quantities of each, ask for them. Of the
+    elements near a point it tries those that can be nearer than the nearest so far.
+
+    An Evaluator, which the solver of references has, tries them all, and believes an inverse map that did not converge:
+    of one point in some thousand.
+    """
 
     def __init__(self, mesh: MeshTet2, among: np.ndarray | None = None) -> None:
         """among: the elements that are searched, (ne,) bool."""
@@ -25,6 +31,10 @@ class _Remembering(Evaluator):
         if among is not None:
             self.table, self.corners = self.table[among], self.corners[among]
             self.tree = KDTree(self.corners.mean(axis=1))
+        self.size = float(np.linalg.norm(np.ptp(self.x, axis=0)))
+        control = self.x[self.table]  # an element lies within the hull of its Bézier points
+        control[:, 4:] = 2.0 * control[:, 4:] - control[:, ElementTetP2.refdom.edges].mean(axis=2)
+        self.lowest, self.highest = control.min(axis=1), control.max(axis=1)
         self.located: dict[bytes, tuple[np.ndarray, np.ndarray]] = {}
 
     def locate(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -34,6 +44,35 @@ class _Remembering(Evaluator):
             self.located[key] = super().locate(points)
         return self.located[key]
 
+    def improve(self, points: np.ndarray, open_: np.ndarray, count: int, found: tuple[np.ndarray, np.ndarray]) -> None:
+        """As Evaluator's, without the elements whose box is farther off than the nearest element so far."""
+        element, local = found
+        count = min(count, len(self.table))
+        near = self.tree.query(points[open_], k=count)[1].reshape(len(open_), count)
+        here = points[open_][:, None]
+        outside = np.maximum(self.lowest[near] - here, here - self.highest[near])
+        least = np.linalg.norm(np.maximum(outside, 0.0), axis=2)
+        while (may := least < self.outside[open_][:, None]).any():
+            some = np.flatnonzero(may.any(axis=1))
+            at, where = may[some].argmax(axis=1), open_[some]
+            least[some, at] = np.inf  # once is enough
+            candidate = near[some, at]
+            reference = self.invert(candidate, points[where])
+            nearest = np.clip(reference, 0.0, 1.0)
+            nearest /= np.maximum(1.0, nearest.sum(axis=1))[:, None]
+            distance, lost = (self.miss(candidate, at, points[where]) for at in (nearest, reference))
+            reference[lost > 0.0] = nearest[lost > 0.0]  # the inverse map did not converge
+            better = distance < self.outside[where]
+            where = where[better]
+            element[where], local[where], self.outside[where] = candidate[better], reference[better], distance[better]
+
+    def miss(self, element: np.ndarray, local: np.ndarray, points: np.ndarray) -> np.ndarray:
+        """Distance (n,) [m] from `points` (n, 3) to the places that reference coordinates (n, 3) are in elements (n,);
+        0 within NOTHING."""
+        values, _ = basis_table(ElementTetP2(), local.T)
+        distance = np.linalg.norm(points - np.einsum("ma,mai->mi", values, self.x[self.table[element]]), axis=1)
+        return np.where(distance < NOTHING * self.size, 0.0, distance)
+
 
 _EVALUATORS: WeakValueDictionary[tuple[bytes, ...], _Remembering] = WeakValueDictionary()
 """By nodes, tetrahedra and the part of them that is searched: solutions that differ by a setting have one mesh, and
@@ -42,6 +81,8 @@ several may be loaded twice."""
 
 OCTANTS = np.array(list(product((1.0, -1.0), repeat=3)))
 """Signs that mirror an octant into the whole body, (8, 3)."""
+NOTHING = 1e-9
+"""Of the body's size: nearer to an element a point is inside."""
 BESIDE = 1e-3
 """Of the body's size: so far from a cut a place is surely on one side of it."""
 TURNED = [0, 2, 1, 5, 4, 3]
