@@ -56,21 +56,21 @@ def distribution(values: Mapping[str, float], floors: Mapping[str, float], seed:
     1993, chapter 13); a single member has none.
     """
     names = [name for name, value in values.items() if value == value]
-    known = np.array([values[name] for name in names])
+    errors = np.array([values[name] for name in names])
     if not names:
         nothing = (np.nan, np.nan)
         return Distribution(0, len(values), np.nan, nothing, nothing, np.nan, nothing, np.nan, "", np.nan, 0)
-    far = np.abs(known)
+    far = np.abs(errors)
     own = np.array([floors.get(name, np.nan) for name in names])
     return Distribution(
         count=len(names),
         lost=len(values) - len(names),
-        median=float(np.median(known)),
-        median_interval=_interval(known, np.median, seed),
-        middle=(float(np.quantile(known, 0.025)), float(np.quantile(known, 0.975))),
+        median=float(np.median(errors)),
+        median_interval=_interval(errors, np.median, seed),
+        middle=(float(np.quantile(errors, 0.025)), float(np.quantile(errors, 0.975))),
         bound=float(np.quantile(far, BOUND)),
         bound_interval=_interval(far, _bound, seed),
-        worst=float(known[far.argmax()]),
+        worst=float(errors[far.argmax()]),
         worst_member=names[int(far.argmax())],
         floor=float(np.nanmax(own)) if (own == own).any() else np.nan,
         resolved=int((own <= np.median(far) / 3.0).sum()),
@@ -86,7 +86,7 @@ def _interval(values: np.ndarray, statistic: object, seed: int) -> tuple[float, 
         return (np.nan, np.nan)
     from scipy.stats import bootstrap  # which takes a quarter of a second to load
 
-    found = bootstrap(
+    ends = bootstrap(
         (values,),
         statistic,
         n_resamples=RESAMPLES,
@@ -94,7 +94,7 @@ def _interval(values: np.ndarray, statistic: object, seed: int) -> tuple[float, 
         vectorized=True,
         rng=np.random.default_rng(seed),
     ).confidence_interval
-    return (float(found.low), float(found.high))
+    return (float(ends.low), float(ends.high))
 
 
 @dataclass(frozen=True)
@@ -122,7 +122,7 @@ class Group:
 
 def groups(runs: Sequence[Run]) -> list[Group]:
     """Runs by organ and body, in their order; organs from files are "file"."""
-    found: dict[tuple[str, str], list[Run]] = {}
+    members: dict[tuple[str, str], list[Run]] = {}
     for run in runs:
-        found.setdefault((run.case.scene.organ.shape, body_words(run.case.body)), []).append(run)
-    return [Group(organ, body, tuple(members)) for (organ, body), members in found.items()]
+        members.setdefault((run.case.scene.organ.shape, body_words(run.case.body)), []).append(run)
+    return [Group(organ, body, tuple(some)) for (organ, body), some in members.items()]

@@ -127,11 +127,11 @@ def rest_distance(run: Run) -> float:
     """100 × RMS distance of the nodes from their rest shape, moved and turned to fit, over the body's size [%]."""
     rest, last = run.fields.rest, run.fields.snapshots[-1]
     mass = run.fields.mass / run.fields.mass.sum()
-    wanted, found = rest - mass @ rest, last - mass @ last
-    left, _, right = np.linalg.svd((mass[:, None] * wanted).T @ found)
+    before, after = rest - mass @ rest, last - mass @ last
+    left, _, right = np.linalg.svd((mass[:, None] * before).T @ after)
     # A turn, never a mirror image (Kabsch 1976).
     turn = left @ np.diag([1.0, 1.0, np.linalg.det(left @ right)]) @ right
-    return PERCENT * float(np.sqrt(mass @ ((found - wanted @ turn) ** 2).sum(axis=1)) / run.size)
+    return PERCENT * float(np.sqrt(mass @ ((after - before @ turn) ** 2).sum(axis=1)) / run.size)
 
 
 def penetration(run: Run) -> float:
@@ -172,8 +172,8 @@ def frequency_error(run: Run) -> float:
     t = run.fields.t[run.checkpoint_frames]
     own = run.fields.snapshots[:, run.material_nodes] - rest
     times, truth = np.array(scene.checkpoints), run.reference.displacements(rest)
-    found, wanted = (ringing_frequency(scene, at, rest, u, weights) for at, u in ((t, own), (times, truth)))
-    return PERCENT * (found / wanted - 1)
+    measured, right = (ringing_frequency(scene, at, rest, u, weights) for at, u in ((t, own), (times, truth)))
+    return PERCENT * (measured / right - 1)
 
 
 def lumen_pressure_error(run: Run) -> float:

@@ -193,14 +193,14 @@ class Run:
         """Mean error of the displacement over the true surface at the last checkpoint, weighted by area, and the
         largest true displacement there [m]; NaN where `sides` is None. A distance beyond SHAPE of the size counts as an
         error."""
-        found = self.boundary_errors
-        if found is None:
+        errors = self.boundary_errors
+        if errors is None:
             return float("nan"), float("nan")
         assert self.reference is not None  # boundary_errors checked it
         far = SHAPE / 100.0 * float(np.linalg.norm(np.ptp(self.reference.boundary.points, axis=0)))
-        errors = np.linalg.norm(found.wrong, axis=1) + np.maximum(0.0, found.distance - far)
-        mean = np.average(errors, weights=found.areas)
-        return float(mean), float(np.linalg.norm(found.truth, axis=1).max())
+        lengths = np.linalg.norm(errors.wrong, axis=1) + np.maximum(0.0, errors.distance - far)
+        mean = np.average(lengths, weights=errors.areas)
+        return float(mean), float(np.linalg.norm(errors.truth, axis=1).max())
 
     @cached_property
     def material_nodes(self) -> np.ndarray:

@@ -10,7 +10,7 @@ from studies.metrics.judged import DISPLACEMENT, FORCE
 from studies.metrics.metric import Metric
 from studies.metrics.metrics import contact_facets, contact_turn
 from studies.metrics.run import Run
-from studies.metrics.trust import Judgement, judgements, tally
+from studies.metrics.trust import ENOUGH, Judgement, judgements, tally
 from studies.store.record import Status
 
 WORST = 10
@@ -116,25 +116,30 @@ def rigid_share(run: Run) -> float:
 
 def trust_of(runs: Sequence[Run]) -> str:
     """How often the comparison of two meshes names a member whose finer body is beyond the target, and doubts one that
-    is within, of the members on which its rule was chosen and of those drawn later."""
+    is within, of the members on which its rule was chosen and of those drawn later; and how many bodies with fewer
+    nodes, which are never trusted, are beyond the target and yet alike."""
     comparisons = judgements(runs)
     if not comparisons:
         return NONE
     lines = [
         "| organ | chosen on: beyond the target, named | within it, doubted "
-        "| judged on: beyond the target, named | within it, doubted |",
-        "|---|---|---|---|---|",
+        "| judged on: beyond the target, named | within it, doubted | fewer nodes: beyond the target, alike |",
+        "|---|---|---|---|---|---|",
     ]
     organs: dict[str, list[Judgement]] = {}
     for one in comparisons:
         organs.setdefault(_organ(one), []).append(one)
     for organ, some in [*organs.items(), ("all", comparisons)]:
-        earlier = [one for one in some if _number_of(one) < CHOSEN_ON.get(_organ(one), 0)]
-        later = [one for one in some if one not in earlier]
+        fine = [one for one in some if one.nodes >= ENOUGH]
+        earlier = [one for one in fine if _number_of(one) < CHOSEN_ON.get(_organ(one), 0)]
+        later = [one for one in fine if one not in earlier]
         cells = []
         for part in (earlier, later):
             count = tally(part)
             cells += [f"{count.beyond}, {count.named}", f"{count.within}, {count.doubted}"] if part else ["–", "–"]
+        coarse = [one for one in some if one.nodes < ENOUGH]
+        beyond = [one for one in coarse if not one.within]
+        cells.append(f"{len(beyond)}, {sum(one.alike for one in beyond)}" if coarse else "–")
         lines.append(f"| {organ} | " + " | ".join(cells) + " |")
     return "\n".join(lines)
 

@@ -144,13 +144,13 @@ def tables_of(folder: Path) -> dict[str, dict[Key, Row]]:
     if not folder.is_dir():
         raise StudyError(f"there is no folder {folder}")
     files = {path.parent.name: path for path in sorted(folder.glob("*/*.csv")) if path.stem == path.parent.name}
-    found = {study: rows for study, path in files.items() if (rows := _read(path))}
-    if not found:
+    tables = {study: rows for study, path in files.items() if (rows := _read(path))}
+    if not tables:
         raise StudyError(
             f"{folder} holds no table of a study whose rows name their recipe; `organbench report --results {folder}` "
             "writes it from the runs"
         )
-    return found
+    return tables
 
 
 def _read(path: Path) -> dict[Key, Row]:
@@ -168,10 +168,10 @@ def _read(path: Path) -> dict[Key, Row]:
 def changes_of(study: str, old: Row, new: Row, same_bits: bool) -> list[Change]:
     """How a case ended and all its metrics that one of the folders has."""
     case = Named(study, *(_text(new.get(name, "")) for name in ROW))
-    found = []
+    changes = []
     if old.get(STATUS) != new.get(STATUS):
         before, after = str(old.get(STATUS)), str(new.get(STATUS))
-        found.append(Change(case, STATUS, "", before, after, np.nan, Verdict.MOVED))
+        changes.append(Change(case, STATUS, "", before, after, np.nan, Verdict.MOVED))
     for column in [column for column in old if column in new]:
         named = METRIC.match(str(column))
         before, after = old[column], new[column]
@@ -182,8 +182,8 @@ def changes_of(study: str, old: Row, new: Row, same_bits: bool) -> list[Change]:
         verdict = verdict_of(float(before), float(after), floor, same_bits)
         if name in JUDGED and str(old.get(REFERENCE)) != str(new.get(REFERENCE)):
             verdict = Verdict.OTHER_REFERENCE
-        found.append(Change(case, name, unit, float(before), float(after), floor, verdict))
-    return found
+        changes.append(Change(case, name, unit, float(before), float(after), floor, verdict))
+    return changes
 
 
 def _text(value: object) -> str:
@@ -198,7 +198,7 @@ def equal_records(old: Path, new: Path, study: str) -> set[Key]:
     """(scene, recipe) of the cases whose records both folders hold, with equal fields. Records that cannot be read, or
     of a scene that there is no more, count as different."""
     mine, theirs = ({path.name: path for path in record_files(folder, study)} for folder in (old, new))
-    found = set()
+    pairs = set()
     for name in sorted(set(mine) & set(theirs)):
         try:
             records = read_record(mine[name]), read_record(theirs[name])
@@ -206,8 +206,8 @@ def equal_records(old: Path, new: Path, study: str) -> set[Key]:
         except StudyError:
             continue
         if _equal(*records):
-            found.add((case.scene.name, recipe_text(case)))
-    return found
+            pairs.add((case.scene.name, recipe_text(case)))
+    return pairs
 
 
 def _equal(one: Record, other: Record) -> bool:

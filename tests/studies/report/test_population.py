@@ -69,12 +69,19 @@ def test_judgements_are_held_against_the_reference():
     assert tally(found) == (2, 1, 3, 1)
 
 
-def test_coarser_meshes_are_not_judged():
-    coarser = [
+def with_fewer_nodes(runs):
+    return [
         replace(one, case=replace(one.case, body=replace(one.case.body, nodes=one.case.body.nodes - 400)))
-        for one in bad_and_good()
+        for one in runs
     ]
-    assert judgements(coarser) == []
+
+
+def test_bodies_with_fewer_nodes_are_never_trusted_and_those_that_are_alike_and_wrong_are_counted():
+    coarse = with_fewer_nodes(bad_and_good())
+    found = judgements(coarse)
+    assert not any(one.trusted for one in found)
+    assert [one.alike for one in found] == [True, True, False, True, False]
+    assert trust_of(coarse).splitlines()[-1] == "| all | – | – | – | – | 2, 1 |"
 
 
 def test_where_nothing_is_compared_nothing_is_judged():
@@ -88,10 +95,10 @@ def test_where_nothing_is_compared_nothing_is_judged():
 def test_the_members_on_which_the_rule_was_chosen_are_counted_apart():
     runs = [*bad_and_good(), *(member(30, body, bend, force) for body, force in ((COARSE, 2.6), (FINE, 2.3)))]
     assert trust_of(runs).splitlines()[2:] == [
-        "| liver | 2, 1 | 3, 1 | 1, 1 | 0, 0 |",
-        "| all | 2, 1 | 3, 1 | 1, 1 | 0, 0 |",
+        "| liver | 2, 1 | 3, 1 | 1, 1 | 0, 0 | – |",
+        "| all | 2, 1 | 3, 1 | 1, 1 | 0, 0 | – |",
     ]
-    assert trust_of(bad_and_good()).splitlines()[-1] == "| all | 2, 1 | 3, 1 | – | – |"
+    assert trust_of(bad_and_good()).splitlines()[-1] == "| all | 2, 1 | 3, 1 | – | – | – |"
     assert "No results" in trust_of([])
 
 
