@@ -9,6 +9,7 @@ from studies.base.errors import DoesNotApply, StudyError
 from studies.catalog import STUDIES
 from studies.catalog.study import SMOKE_FRAMES, SMOKE_NODES, SMOKE_NODES_CUT, SMOKE_NODES_HOLLOW, SMOKE_QUADRATIC
 from studies.metrics.table import metric
+from studies.runs.case import BodyRecipe
 from studies.runs.prepare import prepare
 from studies.store.paths import readable
 from studies.sweep.find_study import MAIN, find_studies, find_study
@@ -83,8 +84,9 @@ def test_smoke_is_small_and_still_the_same_question(study):
 
 
 def kind(case):
-    """What decides how a case is prepared, but for its scene: the recipe without its size, and the method."""
-    return replace(case.body, nodes=0), case.method
+    """What decides how a case is prepared, but for its scene: the recipe without its numbers of nodes and regions, and
+    the method."""
+    return replace(case.body, nodes=0, regions=BodyRecipe().regions), case.method
 
 
 def representatives(cases):
