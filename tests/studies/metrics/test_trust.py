@@ -8,9 +8,11 @@ import pytest
 
 from studies.catalog.of_scene import study_of
 from studies.cli.commands.run import _say_trust
-from studies.metrics.trust import Apart, allowed_share, apart, verdicts, within
+from studies.geometry import HalfSpace
+from studies.metrics.trust import Apart, apart, doubt, verdicts, within
 from studies.metrics.wish import Wish
 from studies.runs.case import BodyRecipe
+from studies.scene.cut import Cut
 from studies.scene.library.liver_probe import LIVER_PROBE
 from studies.scene.library.spleen_sag import SPLEEN_SAG
 from studies.store.record import Status
@@ -75,10 +77,28 @@ def test_coarse_meshes_are_not_trusted_even_where_they_agree(shift):
     assert not verdict.trusted and verdict.why.startswith("meshes with fewer than 1,594 nodes may agree and be wrong")
 
 
+CUT = replace(BALL, cuts=(Cut("section", HalfSpace((0.0, 0.0, 0.0), (0.0, 0.0, 1.0)), at=0.1),))
+
+
+@pytest.mark.parametrize(
+    ("scene", "coarse", "changes", "why"),
+    [
+        (BALL, COARSE, {}, ""),
+        (BALL, replace(FINE, nodes=1494), {}, "meshes with nearly as many nodes"),
+        (BALL, replace(COARSE, graded=True), {"graded": True}, "the rule is measured for adaptive bodies"),
+        (CUT, COARSE, {}, "the rule is not measured for scenes with cuts"),
+    ],
+)
+def test_what_was_not_measured_is_not_trusted_even_where_two_meshes_agree(scene, coarse, changes, why):
+    runs = [body_run(coarse), body_run(replace(FINE, **changes))]
+    (verdict,) = verdicts([replace(one, case=replace(one.case, scene=scene)) for one in runs])
+    assert verdict.trusted == (not why) and verdict.why.startswith(why or "two meshes")
+
+
 @pytest.mark.parametrize("scene", [LIVER_PROBE, SPLEEN_SAG])
 def test_the_study_of_a_scene_takes_the_nodes_that_its_warning_needs(scene):
     bodies = [case for case in study_of(scene).cases if case.body.graded == "adaptive"]
-    assert [case.body.nodes for case in bodies] == [1194, 1594] and allowed_share(bodies[-1]) > 0.0
+    assert [case.body.nodes for case in bodies] == [1194, 1594] and not doubt(*bodies)
 
 
 def test_where_there_is_a_reference_it_judges():
