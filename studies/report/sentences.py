@@ -6,7 +6,6 @@ from pathlib import Path
 from textwrap import fill
 from typing import Any
 
-import numpy as np
 import pandas as pd
 
 from studies.base.errors import StudyError
@@ -14,11 +13,12 @@ from studies.catalog.accuracy import ACCURACY
 from studies.catalog.population import POPULATION, RANGES
 from studies.meshing.bounds import SHAPE
 from studies.metrics.cells import MINUS, plain
-from studies.metrics.distribution import BOUND
+from studies.metrics.distribution import distribution
 from studies.metrics.judged import Judged, over_meshes
 from studies.metrics.wish import Wish, usual_wish
 from studies.plots.campaigns.recovery import RETURNED
 from studies.report.summary import choice_of
+from studies.runs.recipe_text import body_words
 from studies.scene.library import CUT
 from studies.store.record import Status
 from studies.tools.advise.campaign import published_rows
@@ -153,11 +153,11 @@ def recommended(published: Path) -> str:
     """In how many scenes a body is accurate enough, how fast these are, and where none is."""
     speeds, missed = _chosen(published)
     return (
-        f"**Bodies of quadratic tetrahedra that keep one volume per vertex are accurate without fitting.** In "
+        f"**Bodies of quadratic tetrahedra that keep one volume per vertex are accurate without fitted springs.** In "
         f"{len(speeds)} of {len(speeds) + len(missed)} scenes one of them is [accurate "
         f"enough](docs/accuracy.md#accurate-enough) on each of five neighbouring meshes; we compare the largest error "
         f"with the target and ignore the uncertainty of the reference. Those bodies are "
-        f"{_range(speeds.values(), 1)} times as fast as real time on one core. The exceptions: "
+        f"{_range(speeds.values(), 1)} times as fast as real time on one core. The rest: "
         f"{'; '.join(missed) or 'none'}."
     )
 
@@ -167,9 +167,8 @@ def exceptions(published: Path) -> str:
     speeds, missed = _chosen(published)
     return (
         f"**In {len(missed)} of {len(speeds) + len(missed)} scenes no body is shown to be [accurate "
-        f"enough](docs/accuracy.md#accurate-enough).** Elsewhere we compare the error with the target and ignore the "
-        f"uncertainty of the reference. "
-        f"{'; '.join(missed) or 'None'}."
+        f"enough](docs/accuracy.md#accurate-enough)**: {'; '.join(missed) or 'none'}. Elsewhere we compare the error "
+        f"with the target and ignore the uncertainty of the reference."
     )
 
 
@@ -202,17 +201,18 @@ def random_organs(published: Path) -> str:
     counts = ", ".join(f"{len(members[nodes])} {organ}s" for organ, members in populations.items())
     bounds, speeds, missed = [], [], 0
     for organ, members in populations.items():
-        force, mean = (_bound(column(members[nodes], name)) for name in (FORCE, MEAN))
-        bounds.append(f"{organ} {force:.1f} and {mean:.2g} %" if force == force else f"{organ} {mean:.2g} %")
+        force, mean = (_bound(members[nodes], name, digits) for name, digits in ((FORCE, ".1f"), (MEAN, ".2g")))
+        bounds.append(f"{organ} {force} and {mean}" if force else f"{organ} {mean}")
         speeds += [1.0 / speed for speed in column(members[nodes], SPEED)]
         missed += sum(_misses(organ, row) for row in members[nodes])
     finest = [row for members in populations.values() for row in members[nodes]]
     bars = [max(column(finest, name.replace(" [", " floor ["))) for name in (FORCE, MEAN)]
     return (
-        f"**Random organs** ({counts}; shape, tissue and load are random): 95 of 100 have at most these errors in "
-        f"force and mean displacement with adaptive bodies of {nodes:,} surface nodes: {', '.join(bounds)} (no "
-        f"probe, no force; references within {bars[0]:.1f} and {bars[1]:.1f} %). {missed} of {len(finest)} miss their "
-        f"target (3 and 1 %, hollow organs 6 and 3 %) or fail. A simulated second of one member of each organ takes "
+        f"**Random organs** ({counts}; lengths, wall, load and, in solid organs, stiffness are random): the 95th "
+        f"percentile of the error in force and mean displacement of adaptive bodies with {nodes:,} surface nodes is, "
+        f"with the upper end of its 95 % interval, {', '.join(bounds)} % (no probe, no force; references within "
+        f"{bars[0]:.1f} and {bars[1]:.1f} %). On one mesh each, {missed} of {len(finest)} miss their target (3 and "
+        f"1 %, hollow organs 6 and 3 %) or fail. A simulated second of one member of each organ takes "
         f"{_range(speeds, 1)} s on one core ([random organs](docs/population.md))."
     )
 
@@ -249,9 +249,11 @@ def _populations(published: Path) -> dict[str, dict[int, list[Row]]]:
     return populations
 
 
-def _bound(values: Sequence[float]) -> float:
-    """The 95th percentile of the sizes; NaN of none."""
-    return float(np.quantile(np.abs(values), BOUND)) if values else float("nan")
+def _bound(rows: Sequence[Row], name: str, digits: str) -> str:
+    """ "1.8 (2.3)": the 95th percentile of an absolute error of members, and the upper end of its interval; empty where
+    none is known."""
+    errors = distribution({str(row["scene"]): float(row[name]) for row in rows}, {})
+    return f"{errors.bound:{digits}} ({errors.bound_interval[1]:{digits}})" if errors.count else ""
 
 
 def _misses(organ: str, row: Row) -> bool:
@@ -281,7 +283,10 @@ def _chosen(published: Path) -> tuple[dict[str, float], list[str]]:
         if choice is not None and choice.meets:
             speeds[scene.name] = 1.0 / choice.body.cost.value
         elif choice is not None:
-            missed.append(f"{scene.name} {_why_not(choice.body, choice.wish)}{_adaptive(published, scene.name)}")
+            nearest = (
+                f"in {scene.name} the nearest body that keeps its shape ({body_words(choice.body.case.body)} nodes)"
+            )
+            missed.append(f"{nearest} {_why_not(choice.body, choice.wish)}{_adaptive(published, scene.name)}")
     return speeds, missed
 
 
@@ -329,10 +334,10 @@ def cuts(published: Path) -> str:
     )
     floors = {name: max(column(finest.values(), name.replace(" [", " floor ["))) for name in (OPENING, FORCE)}
     return (
-        f"**Organs can be cut.** On {len(gaping)} scenes the opening of adaptive bodies that run in real time is "
-        f"{_range(off[OPENING], 1)} % off and their force {_range(off[FORCE], 1)} % (references within "
-        f"{floors[OPENING]:.1f} and {floors[FORCE]:.1f} %); where cuts are pressed shut, the sliding of "
-        f"their faces is {_range(column(closed, OPENING), 1)} % off. Displacements are within "
+        f"**Organs can be cut.** In {len(gaping)} scenes, with adaptive bodies (finer where strains are large) in real "
+        f"time, the width of the cut is at most {max(off[OPENING]):.1f} % off and the force {max(off[FORCE]):.1f} % "
+        f"(references within {floors[OPENING]:.1f} and {floors[FORCE]:.1f} %); where cuts are pressed shut, the "
+        f"sliding of their faces is {_range(column(closed, OPENING), 1)} % off. Displacements are within "
         f"{max(column(finest.values(), MEAN)):.1f} %, volumes of pieces within {max(column(adaptive, PIECE)):.1g} % "
         f"([cut an organ](docs/cutting.md)).{shape}"
     )
