@@ -14,9 +14,9 @@ from studies.scene.scene import Scene
 POPULATION = "population"
 """The study that `organbench run population` brings up to date."""
 MEMBERS = (
-    Population("liver", 38),
-    Population("kidney", 38),
-    Population("stomach", 38),
+    Population("liver", 76),
+    Population("kidney", 76),
+    Population("stomach", 50),
     Population("spleen", 30),
     Population("bladder", 30),
 )
