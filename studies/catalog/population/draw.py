@@ -158,12 +158,17 @@ def _rounded(vector: Vector) -> Vector:
 
 def _able(shape: Shape, point: PalpationPoint, radius: float, depth: float) -> bool:
     """Whether a probe of `radius` can be pushed in by `depth` there: it starts clear of the organ, touches a patch
-    that is nearly flat, far from what is held, with three times the depth of organ behind it."""
+    that is nearly flat, far from what is held, with three times the depth of organ behind it, and where it ends nothing
+    is held."""
     at, outward = np.asarray(point.point), np.asarray(point.normal)
     ball = at + (radius + GAP) * outward + radius * _directions()
     if (shape.level(ball) <= 0.0).any():
         return False
     if shape.level((at - 3.0 * depth * outward)[None])[0] >= 0.0:
+        return False
+    end = at + (radius - depth) * outward + radius * _directions(4000)
+    beyond = end[(end - at) @ outward < -depth / 2.0]  # not the air from which the probe comes
+    if any(((region.level(beyond) <= 0.0) & (shape.level(beyond) > 0.0)).any() for region in shape.regions.values()):
         return False
     across = np.linalg.svd(outward[None])[2][1:]
     turns = np.linspace(0.0, 2.0 * np.pi, 12, endpoint=False)

@@ -65,6 +65,16 @@ def test_the_probe_starts_clear_of_the_mesh_and_ends_inside_it(name):
         assert np.linalg.norm(mesh.points[held] - probe.centre, axis=1).min() > probe.radius + _depth(scene)
 
 
+def test_nothing_is_clamped_where_a_probe_ends():
+    """Kidney 58: at the first place that is drawn the probe would end 1 mm inside the clamped sinus, which no solver can
+    do."""
+    scene = member("kidney", 0, 58)
+    mesh = organ("kidney", 800, scene.regions, False, scene.organ.parameters)
+    (held,), probe = mesh.patches.values(), scene.obstacles[0]
+    end = np.asarray(probe.centre) + probe.path.displacements[-1]
+    assert np.linalg.norm(mesh.points[held] - end, axis=1).min() > probe.radius
+
+
 @pytest.mark.slow
 def test_the_coarsest_mesh_of_a_reference_is_clear_of_a_probe_that_is_clear_of_the_true_shape():
     """Liver 18: the probe stands .5 mm off the true shape, and a uniform mesh of 250 surface nodes bulged into it."""
