@@ -66,8 +66,8 @@ def test_the_probe_starts_clear_of_the_mesh_and_ends_inside_it(name):
 
 
 def test_nothing_is_clamped_where_a_probe_ends():
-    """Kidney 58: at the first place that is drawn the probe would end 1 mm inside the clamped sinus, and no solver finds
-    a solution."""
+    """Kidney 58: at the first place that is drawn the probe would end 1 mm inside the clamped sinus, and there is no
+    solution."""
     scene = member("kidney", 0, 58)
     mesh = organ("kidney", 800, scene.regions, False, scene.organ.parameters)
     (held,), probe = mesh.patches.values(), scene.obstacles[0]
