@@ -4,6 +4,7 @@ import re
 import shutil
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 import pytest
 
@@ -71,7 +72,7 @@ def test_a_scene_whose_reference_decides_nothing_is_not_called_missed(published)
 
     text = changed(published, "accuracy", spoil)
     assert "In 7 of 9 scenes" in text
-    assert re.search(r"in ball_clamped the nearest body that keeps its shape \([^)]*\) is undecided, because", text)
+    assert re.search(r"in ball_clamped the nearest body \([^)]*\) is undecided, because", text)
     assert "its reference is only known to ±2 % in displacement" in text
 
 
@@ -80,7 +81,7 @@ def test_a_scene_without_an_accurate_body_says_by_how_much_it_misses(published):
         rows.loc[rows["scene"] == "kidney_probe", "force_end [%]"] = 3.5
 
     text = changed(published, "accuracy", spoil)
-    assert "in kidney_probe the nearest body that keeps its shape (" in text
+    assert "in kidney_probe the nearest body (" in text
     assert "misses the target of 3 % for force with 3.5 % (10 of 10 adaptive bodies end well and are" in text
 
 
@@ -291,6 +292,43 @@ def test_random_organs_are_counted_as_the_table_of_the_population_counts_them(pu
     rows.loc[kidney, "mean_error [%]"], rows.loc[kidney, "status"] = float("nan"), "inverted"
     rows.to_csv(path, index=False)
     assert f"{missed + 1} of {total} miss" in random_organs(published), "who fails misses"
+
+
+def test_counts_that_the_page_of_random_organs_quotes():
+    """How often references are not known well enough, forces still vary at the end, and 1,194 nodes are too few."""
+    rows = pd.read_csv(TABLES / "population" / "population.csv")
+    rows = rows[rows["body"].str.startswith("adaptive")]
+    rows["organ"] = rows["scene"].str.split("_").str[0]
+    hollow = rows["organ"].isin(["stomach", "bladder"])
+    targets = {"force_end": hollow.map({True: 6.0, False: 3.0}), "mean_error": hollow.map({True: 3.0, False: 1.0})}
+    sizes = {name: rows[f"{name} [%]"].abs() for name in targets}
+    bars = {name: rows[f"{name} floor [%]"] for name in targets}
+    finest = rows["nodes"] == 1594
+
+    def count(which):
+        counts = which.groupby(rows["organ"]).sum()
+        return {organ: int(number) for organ, number in counts.items() if number}
+
+    coarse_bars = {name: count(finest & (bars[name] > targets[name] / 3.0)) for name in targets}
+    assert coarse_bars == {"force_end": {"liver": 9}, "mean_error": {"kidney": 8, "liver": 25, "spleen": 10}}
+    beyond, reaches = (
+        finest & np.logical_or(*(sizes[name] + sign * bars[name] > targets[name] for name in targets))
+        for sign in (-1.0, 1.0)
+    )
+    assert rows["scene"][beyond].tolist() == ["spleen_0_006"]
+    assert count(reaches & ~beyond) == {"liver": 20, "spleen": 9}
+    assert count(finest & (rows["sway [%]"] > 1.0)) == {"liver": 14, "stomach": 35}
+    coarser = {name: count((rows["nodes"] == 1194) & (sizes[name] > targets[name])) for name in targets}
+    assert coarser == {"force_end": {"liver": 3}, "mean_error": {"liver": 21, "spleen": 9}}
+    said = page("docs/population.md")
+    for words in (
+        "for 25 of 76 livers, 8 of 76 kidneys and 10 of 30 spleens, in force for 9 of 76 livers",
+        "20 livers and 9 spleens may be on either side",
+        "the force of 14 livers and 35 stomachs still varies by 1 to 2 %",
+        "3 of 76 livers miss the target in force (up to 4.3 %) and 21 in mean displacement",
+        "one of 262 bodies, spleen_0_006",
+    ):
+        assert words in said
 
 
 def test_methods_of_the_page_are_those_of_the_tuple():

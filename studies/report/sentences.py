@@ -154,9 +154,9 @@ def recommended(published: Path) -> str:
     speeds, missed = _chosen(published)
     return (
         f"**Bodies of quadratic tetrahedra that keep one volume per vertex are accurate without fitted springs.** In "
-        f"{len(speeds)} of {len(speeds) + len(missed)} scenes one of them is [accurate "
-        f"enough](docs/accuracy.md#accurate-enough) on each of five neighbouring meshes; we compare the largest error "
-        f"with the target and ignore the uncertainty of the reference. Those bodies are "
+        f"{len(speeds)} of {len(speeds) + len(missed)} scenes one of them, uniform or adaptive (finer where strains "
+        f"are large), is [accurate enough](docs/accuracy.md#accurate-enough) on each of five neighbouring meshes; we "
+        f"compare the largest error with the target and ignore the uncertainty of the reference. Those bodies are "
         f"{_range(speeds.values(), 1)} times as fast as real time on one core. The rest: "
         f"{'; '.join(missed) or 'none'}."
     )
@@ -283,9 +283,7 @@ def _chosen(published: Path) -> tuple[dict[str, float], list[str]]:
         if choice is not None and choice.meets:
             speeds[scene.name] = 1.0 / choice.body.cost.value
         elif choice is not None:
-            nearest = (
-                f"in {scene.name} the nearest body that keeps its shape ({body_words(choice.body.case.body)} nodes)"
-            )
+            nearest = f"in {scene.name} the nearest body ({body_words(choice.body.case.body)} nodes)"
             missed.append(f"{nearest} {_why_not(choice.body, choice.wish)}{_adaptive(published, scene.name)}")
     return speeds, missed
 
@@ -334,8 +332,8 @@ def cuts(published: Path) -> str:
     )
     floors = {name: max(column(finest.values(), name.replace(" [", " floor ["))) for name in (OPENING, FORCE)}
     return (
-        f"**Organs can be cut.** In {len(gaping)} scenes, with adaptive bodies (finer where strains are large) in real "
-        f"time, the width of the cut is at most {max(off[OPENING]):.1f} % off and the force {max(off[FORCE]):.1f} % "
+        f"**Organs can be cut.** In {len(gaping)} scenes, with adaptive bodies in real time, "
+        f"the width of the cut is at most {max(off[OPENING]):.1f} % off and the force {max(off[FORCE]):.1f} % "
         f"(references within {floors[OPENING]:.1f} and {floors[FORCE]:.1f} %); where cuts are pressed shut, the "
         f"sliding of their faces is {_range(column(closed, OPENING), 1)} % off. Displacements are within "
         f"{max(column(finest.values(), MEAN)):.1f} %, volumes of pieces within {max(column(adaptive, PIECE)):.1g} % "
