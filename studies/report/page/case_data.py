@@ -158,9 +158,9 @@ def errors_of(run: Run, nodes: np.ndarray) -> dict[str, Any]:
     """Distances [m] of `nodes` (v,) from their places in the reference at all checkpoints that the run reached, one row
     after the other, before them those at rest; and the largest."""
     assert run.reference is not None  # the caller checked it
-    rest, own, known = run.fields.rest[nodes], run.fields.snapshots[:, nodes], run.material_nodes
-    # Asked for all: the metrics have found their places in the reference already.
-    truth = run.reference.displacements(run.places[known])[: len(own), np.searchsorted(known, nodes)]
+    rest, own, material = run.fields.rest[nodes], run.fields.snapshots[:, nodes], run.material_nodes
+    # The metrics have asked for all of them, so their places in the reference need no second search.
+    truth = run.reference.displacements(run.places[material])[: len(own), np.searchsorted(material, nodes)]
     error = np.linalg.norm(own - rest - truth, axis=-1)
     reached = np.array(run.case.scene.checkpoints[: len(own)], float)
     times, rows = from_rest(run.case.scene, reached, np.zeros(len(nodes)), error)
