@@ -33,6 +33,10 @@ UNUSUAL = 100.0
 LARGE = 10.0
 """Times the body's size: a longer length cannot be meant."""
 AXIS_POINTS = 9
+SIDES = ((0, 1), (1, 2), (2, 0), (0, 1, 2))
+"""Corners of a triangle between which a surface is sampled once more."""
+PATH_TIMES = 41
+"""At which the distance of an obstacle to what is held is measured, besides those of the path itself."""
 
 
 def check_scene(scene: Scene) -> list[str]:
@@ -58,12 +62,14 @@ def check_scene(scene: Scene) -> list[str]:
             raise
         return [*found, f"the cases of scene '{scene.name}' will fail: {error}"]
     size = float(np.linalg.norm(np.ptp(points, axis=0)))
+    samples = np.concatenate([points, *(points[triangles[:, side]].mean(axis=1) for side in SIDES)])
     for number, obstacle in enumerate(scene.obstacles):
         found += _too_large(scene, f"obstacle {number}", _width(obstacle), size)
         found += _too_large(scene, f"the path of obstacle {number}", _reach(obstacle.path), size)
         if scene.start is None or not scene.start.shaped:
             _check_start(scene, number, depth_at_start(obstacle, points, triangles, has_wall(scene)), size)
         found += _pressed_through(scene, number, points)
+        found += _pressed_into_held(scene, number, samples, size)
     for held in scene.held:
         found += _too_large(scene, f"the path of region '{held.name}'", _reach(held.path), size)
         _check_region(scene, held.name, held.region.level(points), points, triangles)
@@ -164,6 +170,22 @@ def _pressed_through(scene: Scene, number: int, points: np.ndarray) -> list[str]
         f"scene '{scene.name}': obstacle {number} is pressed {1e3 * deepest:.3g} mm into a body that is "
         f"{1e3 * thick:.3g} mm thick there: is its path in metres?"
     ]
+
+
+def _pressed_into_held(scene: Scene, number: int, samples: np.ndarray, size: float) -> list[str]:
+    """An obstacle that goes into a held region, whose nodes cannot get out of its way. As deep as seen at `samples` of
+    the surface (n, 3) [m], which may miss a fraction of their spacing."""
+    obstacle, warned = scene.obstacles[number], []
+    for held in scene.held:
+        nodes = samples[held.region.level(samples) <= 0.0]
+        times = [*np.linspace(0.0, scene.duration, PATH_TIMES), *obstacle.path.times, *held.path.times]
+        deepest = max((-float(obstacle.gap(nodes + held.path(t), t).min()) for t in times if len(nodes)), default=0.0)
+        if deepest > START_DEPTH * size:
+            warned.append(
+                f"scene '{scene.name}': obstacle {number} goes {1e3 * deepest:.2g} mm into held region '{held.name}', "
+                "which cannot give way: elements between them may fold; end its path earlier, or hold less"
+            )
+    return warned
 
 
 def _unusual(scene: Scene, what: str, value: float, usual: tuple[float, float], unit: str) -> list[str]:

@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 from massspring import Capsule, Plane, Sphere, Trajectory
+from studies.geometry import HalfSpace
 from studies.geometry.organs.make_shape import make_shape
 from studies.scene.checks import check_scene, depth_at_start, surface_of
 from studies.scene.library import SCENES
 from studies.scene.library.stress import STRESS_SCENES
-from studies.scene.scene import Organ
+from studies.scene.scene import Held, Organ
 from studies.sweep.local import Local
 from tests.studies.tiny import SQUEEZE, tiny_case
 
@@ -239,6 +240,22 @@ def test_a_plane_pressed_through_a_body_that_cannot_give_way_is_a_warning():
     (sentence,) = warnings_for(obstacles=(plane, SQUEEZE.obstacles[0]))
     assert "is pressed 119 mm into a body that is 100 mm thick there" in sentence
     assert warnings_for(obstacles=(plane,)) == [], "it pushes the body before it"
+
+
+def test_an_obstacle_that_goes_into_what_is_held_is_a_warning():
+    """A ball of radius 50 mm held below z = -45 mm, and a probe that comes from the side at z = -49 mm."""
+    cap = Held("foot", HalfSpace((0.0, 0.0, -0.045), (0.0, 0.0, 1.0)))
+    path = Trajectory((0.0, 1.0), ((0.0, 0.0, 0.0), (-0.06, 0.0, 0.0)))
+    probe = Sphere((0.1, 0.0, -0.049), 0.005, path)  # it ends at x = 40 mm, the cap at 21.8 mm
+    assert warnings_for(obstacles=(probe,), held=(cap,)) == []
+    deeper = replace(probe, path=replace(path, displacements=((0.0, 0.0, 0.0), (-0.083, 0.0, 0.0))))
+    (sentence,) = warnings_for(obstacles=(deeper,), held=(cap,))
+    deepest = 5.0 - (np.hypot(17.0, 49.0) - 50.0)  # [mm], where it ends, at (17, 0, -49) mm
+    assert "obstacle 0 goes" in sentence and "into held region 'foot'" in sentence
+    depth = float(sentence.split("goes ")[1].split(" mm")[0])
+    assert 0.0 < depth == pytest.approx(deepest, abs=0.4)
+    moving = Held("foot", cap.region, path=Trajectory((0.0, 1.0), ((0.0, 0.0, 0.0), (0.0, 0.0, -0.01))))
+    assert warnings_for(obstacles=(deeper,), held=(moving,)) == [], "it moves out of the way"
 
 
 @pytest.mark.parametrize("scene", [*SCENES, *STRESS_SCENES], ids=lambda scene: scene.name)
