@@ -100,12 +100,12 @@ def entry_files(root: Path) -> list[Path]:
 
 
 def entries_beside(
-    root: Path, scenes: Iterable[Scene], known: Callable[[Scene], Reference | None]
+    root: Path, scenes: Iterable[Scene], reference_for: Callable[[Scene], Reference | None]
 ) -> tuple[list[Run], list[str]]:
     """The entries in `scenes`, judged by the references of these; and what cannot be read, a sentence each. A scene is
     the same whatever its reference's meshes and its number of frames."""
-    wanted = {_same(given): (given, scene) for scene in scenes for given in _given(scene)}
-    found, problems = [], []
+    pairs = {_same(given): (given, scene) for scene in scenes for given in _given(scene)}
+    runs, problems = [], []
     for path in entry_files(root):
         try:
             record = read_record(path)
@@ -113,10 +113,12 @@ def entries_beside(
         except StudyError as problem:
             problems.append(str(problem))
             continue
-        given, scene = wanted.get(_same(run.case.scene), (None, None))
+        given, scene = pairs.get(_same(run.case.scene), (None, None))
         if given is not None and scene is not None:
-            found.append(replace(run, case=run.case.replaced(scene=given), reference=reference_of(given, known(scene))))
-    return found, problems
+            runs.append(
+                replace(run, case=run.case.replaced(scene=given), reference=reference_of(given, reference_for(scene)))
+            )
+    return runs, problems
 
 
 def _given(scene: Scene) -> list[Scene]:

@@ -37,8 +37,8 @@ def export(scene: Scene, folder: Path, nodes: int, rows: Sequence[Sequence[str]]
     scene = given_scene(scene)
     check_folder(folder)
     meshes, why_not = given_meshes(scene, nodes)
-    found = rounded(description(scene, meshes, why_not))
-    texts = {DESCRIPTION: json.dumps(found, indent=1) + "\n", README: readme(found, nodes, rows), NAME: SOLVER}
+    data = rounded(description(scene, meshes, why_not))
+    texts = {DESCRIPTION: json.dumps(data, indent=1) + "\n", README: readme(data, nodes, rows), NAME: SOLVER}
     texts[SOFA.name] = SOFA.read_text(encoding="utf-8")
     if (folder / NAME).is_file() and (folder / NAME).read_text(encoding="utf-8", errors="replace") != SOLVER:
         del texts[NAME]
@@ -82,12 +82,12 @@ def marks(mesh: GivenMesh) -> dict[str, np.ndarray]:
     """Point data, 1 or 0, (n,): outer surface, lumen and held regions."""
     number = np.arange(len(mesh.points))
     outer = number < mesh.mesh.outer_count
-    found = {OUTER: outer}
+    masks = {OUTER: outer}
     if mesh.mesh.hollow:
-        found[LUMEN] = ~outer & (number < mesh.mesh.surface_count)
+        masks[LUMEN] = ~outer & (number < mesh.mesh.surface_count)
     for name, nodes in mesh.held_nodes().items():
-        found[HELD + name] = np.isin(number, nodes)
-    return {name: values.astype(np.int32) for name, values in found.items()}
+        masks[HELD + name] = np.isin(number, nodes)
+    return {name: values.astype(np.int32) for name, values in masks.items()}
 
 
 def _write_surface(meshes: Sequence[GivenMesh], path: Path) -> Path:

@@ -68,22 +68,22 @@ def force_at(name: str, t: np.ndarray, times: np.ndarray, force: np.ndarray, sce
 
 def _times(handed: Handed, scene: Scene) -> np.ndarray:
     """The times of all steps, the first 0 (F + 1,)."""
-    name, steps, wanted = handed.name, len(handed.positions), np.array([0.0, *scene.checkpoints])
-    t = wanted if handed.t is None else np.asarray(handed.t)
+    name, steps, times = handed.name, len(handed.positions), np.array([0.0, *scene.checkpoints])
+    t = times if handed.t is None else np.asarray(handed.t)
     if not steps:
-        raise StudyError(f"{name} holds no steps; hand in rest and {len(wanted) - 1} checkpoints")
+        raise StudyError(f"{name} holds no steps; hand in rest and {len(times) - 1} checkpoints")
     if t.shape != (steps,):
         what = "files" if handed.t is None else "steps"
-        raise StudyError(f"{name}: {steps} {what} for {t.size} times; hand in rest and {len(wanted) - 1} checkpoints")
+        raise StudyError(f"{name}: {steps} {what} for {t.size} times; hand in rest and {len(times) - 1} checkpoints")
     if not np.isfinite(t).all() or (np.diff(t) <= 0).any():
         raise StudyError(f"{name}: the times of the steps must be increasing numbers")
     near = SAME_TIME * scene.duration
     if len(t) > 1 and abs(t[-1] / 1e3 - scene.duration) <= near:
         raise StudyError(f"{name}: the times go to {t[-1]:g}, the scene to {scene.duration:g} s: give seconds, not ms")
-    missing = wanted[[np.abs(t - one).min() > near for one in wanted]]
+    missing = times[[np.abs(t - one).min() > near for one in times]]
     if len(missing):
         rest = " (t = 0 is the rest shape)" if missing[0] == 0.0 else ""
-        raise StudyError(f"{name}: steps are missing at t = {_list(missing)} s{rest}; hand in all of {_list(wanted)}")
+        raise StudyError(f"{name}: steps are missing at t = {_list(missing)} s{rest}; hand in all of {_list(times)}")
     if t[0] < -near or abs(t[0]) > near:
         raise StudyError(f"{name}: the first step is at t = {t[0]:g} s; begin with the rest shape at t = 0")
     return t
@@ -112,9 +112,9 @@ def _mesh_of(name: str, count: int, meshes: Sequence[GivenMesh]) -> GivenMesh:
                 f"{name}: positions of {count} nodes, but {FILES[mesh.kind]} has {len(mesh.points)}: the reader joined "
                 "those that lie at one place, which shuts the cut; read it without"
             )
-    known = " and ".join(f"{FILES[mesh.kind]} {len(mesh.points)}" for mesh in meshes)
+    sizes = " and ".join(f"{FILES[mesh.kind]} {len(mesh.points)}" for mesh in meshes)
     raise StudyError(
-        f"{name}: positions of {count} nodes, but {known} at this number of vertices; they belong to another mesh "
+        f"{name}: positions of {count} nodes, but {sizes} at this number of vertices; they belong to another mesh "
         "(--nodes gives the number of vertices of the exported mesh)"
     )
 
@@ -132,7 +132,7 @@ def _check_rest(name: str, rest: np.ndarray, mesh: GivenMesh) -> None:
     tree = KDTree(points)
     for unit, metres in UNITS.items():
         scaled = metres * rest
-        distance, nearest = (np.asarray(found) for found in tree.query(scaled))
+        distance, nearest = (np.asarray(array) for array in tree.query(scaled))
         if distance.max() > SAME * size:
             continue
         if metres != 1.0:

@@ -86,9 +86,9 @@ def _check_separators(path: Path) -> None:
         head, first = (next(file, "") for _ in range(2))
     semicolons = ";" in head
     commas = re.search(r"\d,\d", first) if semicolons else first.count(",") > head.count(",")
-    found = ["semicolons between its columns"] * semicolons + ["commas in its numbers"] * bool(commas)
-    if found:
-        raise StudyError(f"{path.name} has {' and '.join(found)}: write commas between columns and points in numbers")
+    faults = ["semicolons between its columns"] * semicolons + ["commas in its numbers"] * bool(commas)
+    if faults:
+        raise StudyError(f"{path.name} has {' and '.join(faults)}: write commas between columns and points in numbers")
 
 
 def _read_npz(path: Path) -> Handed:
@@ -105,8 +105,8 @@ def _read_npz(path: Path) -> Handed:
     odd = [name for name, values in stored.items() if np.iscomplexobj(values)]
     if odd:
         raise StudyError(f"{path.name}: {odd[0]} holds complex numbers; hand in real ones")
-    found = {name: np.asarray(values, np.float64) for name, values in stored.items()}
-    return Handed(path.name, found.pop("t"), found.pop("positions"), found)
+    arrays = {name: np.asarray(values, np.float64) for name, values in stored.items()}
+    return Handed(path.name, arrays.pop("t"), arrays.pop("positions"), arrays)
 
 
 def _read_csv(path: Path) -> Handed:
@@ -148,8 +148,8 @@ def _read_pvd(path: Path) -> Handed:
     rows = sorted((float(entry.attrib["timestep"]), entry.attrib["file"]) for entry in sets)
     if not rows:
         raise StudyError(f"{path.name} names no files")
-    found = [read_points(path.parent / name) for _, name in rows]
-    return Handed(path.name, np.array([t for t, _ in rows]), _of_grids(path.name, found), {})
+    grids = [read_points(path.parent / name) for _, name in rows]
+    return Handed(path.name, np.array([t for t, _ in rows]), _of_grids(path.name, grids), {})
 
 
 def _read_series(path: Path) -> Handed:

@@ -66,7 +66,7 @@ def measured(fitting: Fitting) -> dict[str, np.ndarray]:
     """The fields of a record: what a run records of itself, read off the positions."""
     mesh, t, x = fitting.mesh, fitting.t, fitting.positions
     scene, body, steps = mesh.scene, mesh.body, len(fitting.t)
-    at = [int(np.argmin(np.abs(t - wanted))) for wanted in scene.checkpoints]
+    at = [int(np.argmin(np.abs(t - checkpoint))) for checkpoint in scene.checkpoints]
     surface, names = body.surface_nodes, mesh.volumes.names
     depth = [[_depth(obstacle, each, surface, body.triangles, float(when)) for obstacle in scene.obstacles]
              for when, each in zip(t, x, strict=True)]  # fmt: skip

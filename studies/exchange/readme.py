@@ -66,32 +66,32 @@ can. `pressure` is positive in compression.
 """
 
 
-def readme(found: Mapping[str, Any], nodes: int, rows: Sequence[Sequence[str]] = ()) -> str:
+def readme(scene: Mapping[str, Any], nodes: int, rows: Sequence[Sequence[str]] = ()) -> str:
     """The text for what `description` gives; nodes: vertices on the outer surface; rows: as `export` takes them."""
     return TEXT.format(
-        name=found["name"],
-        title=found["title"],
-        version_words=f'its layout is "{found["schema"]}" {found["version"]}',
-        meshes="\n".join(_mesh_rows(found)),
-        cut_files="".join(f"\n| {row}" for row in _cut_rows(found)),
-        lumen_column=", and the factor of the lumen's volume," if found["lumen"] else "",
-        point_data=", ".join(f"`{name}`" for name in _point_data(found)),
-        mu=found["material"]["shear_modulus"],
-        kappa=found["material"]["bulk_modulus"],
-        rho=found["material"]["density"],
-        material=found["material"]["words"],
-        start=found["start"]["words"],
-        gravity=tuple(found["gravity"]),
-        damping=found["damping"]["rate"],
-        damping_words=found["damping"]["words"],
-        loads="\n".join(_loads(found)),
-        lumen=found["lumen"]["words"] if found["lumen"] else "None: the organ is solid.",
-        cut=f"\n- **Cut.** {found['cut']['words']}" if found["cut"] else "",
-        duration=found["duration"],
-        checkpoints=", ".join(f"{t:g}" for t in found["checkpoints"]),
-        force=found["force"]["words"],
-        metrics="\n".join(_metric_rows(found)),
-        last=found["checkpoints"][-1],
+        name=scene["name"],
+        title=scene["title"],
+        version_words=f'its layout is "{scene["schema"]}" {scene["version"]}',
+        meshes="\n".join(_mesh_rows(scene)),
+        cut_files="".join(f"\n| {row}" for row in _cut_rows(scene)),
+        lumen_column=", and the factor of the lumen's volume," if scene["lumen"] else "",
+        point_data=", ".join(f"`{name}`" for name in _point_data(scene)),
+        mu=scene["material"]["shear_modulus"],
+        kappa=scene["material"]["bulk_modulus"],
+        rho=scene["material"]["density"],
+        material=scene["material"]["words"],
+        start=scene["start"]["words"],
+        gravity=tuple(scene["gravity"]),
+        damping=scene["damping"]["rate"],
+        damping_words=scene["damping"]["words"],
+        loads="\n".join(_loads(scene)),
+        lumen=scene["lumen"]["words"] if scene["lumen"] else "None: the organ is solid.",
+        cut=f"\n- **Cut.** {scene['cut']['words']}" if scene["cut"] else "",
+        duration=scene["duration"],
+        checkpoints=", ".join(f"{t:g}" for t in scene["checkpoints"]),
+        force=scene["force"]["words"],
+        metrics="\n".join(_metric_rows(scene)),
+        last=scene["checkpoints"][-1],
         nodes=nodes,
         yardsticks="\n".join(_yardsticks(rows)),
     )
@@ -104,29 +104,29 @@ def _yardsticks(rows: Sequence[Sequence[str]]) -> list[str]:
     return [*head, "|---|---|---|", *(f"| {' | '.join(row)} |" for row in rows)]
 
 
-def _mesh_rows(found: Mapping[str, Any]) -> list[str]:
+def _mesh_rows(scene: Mapping[str, Any]) -> list[str]:
     rows = [
         f"| {mesh['file']} | {mesh['nodes']} nodes, {mesh['tetrahedra']} {mesh['cells']} |"
-        for mesh in found["meshes"].values()
+        for mesh in scene["meshes"].values()
     ]
-    why = found["why_no_curved_mesh"]
+    why = scene["why_no_curved_mesh"]
     return [*rows, f"| (no curved mesh) | {why} |"] if why else rows
 
 
-def _cut_rows(found: Mapping[str, Any]) -> list[str]:
-    files = {kind: found["cut"]["files"][kind] for kind in found["meshes"]} if found["cut"] else {}
+def _cut_rows(scene: Mapping[str, Any]) -> list[str]:
+    files = {kind: scene["cut"]["files"][kind] for kind in scene["meshes"]} if scene["cut"] else {}
     return [f"{file} | pairs of facets of the cut, by nodes of {kind}.vtu |" for kind, file in files.items()]
 
 
-def _point_data(found: Mapping[str, Any]) -> list[str]:
-    return ["outer", *(["lumen"] if found["lumen"] else []), *(held["point_data"] for held in found["held"])]
+def _point_data(scene: Mapping[str, Any]) -> list[str]:
+    return ["outer", *(["lumen"] if scene["lumen"] else []), *(held["point_data"] for held in scene["held"])]
 
 
-def _loads(found: Mapping[str, Any]) -> list[str]:
-    rows = [f"- **Held region {h['name']}**: its nodes move together; it {h['path']['words']}." for h in found["held"]]
-    return rows + [f"- **Obstacle {number}.** {o['words']}" for number, o in enumerate(found["obstacles"])]
+def _loads(scene: Mapping[str, Any]) -> list[str]:
+    rows = [f"- **Held region {h['name']}**: its nodes move together; it {h['path']['words']}." for h in scene["held"]]
+    return rows + [f"- **Obstacle {number}.** {o['words']}" for number, o in enumerate(scene["obstacles"])]
 
 
-def _metric_rows(found: Mapping[str, Any]) -> list[str]:
-    rows = [(m["name"], m["unit"], m["definition"].replace("|", "\\|"), m["better"]) for m in found["judged"]]
+def _metric_rows(scene: Mapping[str, Any]) -> list[str]:
+    rows = [(m["name"], m["unit"], m["definition"].replace("|", "\\|"), m["better"]) for m in scene["judged"]]
     return [f"| {' | '.join(row)} |" for row in rows]

@@ -82,7 +82,7 @@ class Judged:
         errors = {"force": (self.force, wish.force), "displacement": (self.displacement, wish.displacement)}
         return _shares({**errors, "budget": (self.cost, wish.budget)}) | self.off_shape
 
-    def untold(self, wish: Wish) -> bool:
+    def undecided(self, wish: Wish) -> bool:
         """Whether an error is wished finer than the reference is known."""
         pairs = ((self.force, wish.force), (self.displacement, wish.displacement))
         return any(bound is not None and error.uncertainty > bound for error, bound in pairs)
@@ -107,21 +107,21 @@ def judged(run: Run) -> Judged | None:
     return Judged(run.case, force, displacement, cost_of(run), dt, timed, shape, volume)
 
 
-def over_meshes(found: Iterable[Judged]) -> list[Judged]:
+def over_meshes(rows: Iterable[Judged]) -> list[Judged]:
     """Rows of one scene, those of neighbouring meshes as one, with the largest errors, at the place of the middle one.
 
     Where any quadratic recipe ran on all five, one of implicit_volume that did not is left out: on one mesh it may be
     right by luck, and of five where one ended badly it is not reliable."""
-    rows = {(one.case.body, _setting(one)): one for one in found}
+    by_setting = {(one.case.body, _setting(one)): one for one in rows}
     families = dict[tuple[BodyRecipe, str], Judged]()
-    for (body, setting), one in rows.items():
-        members = [rows.get((mesh, setting)) for mesh in neighbours(body)]
+    for (body, setting), one in by_setting.items():
+        members = [by_setting.get((mesh, setting)) for mesh in neighbours(body)]
         if body.kind == "quadratic" and all(members):
             families[body, setting] = _largest(one, tuple(member for member in members if member is not None))
     if not families:
-        return list(rows.values())
+        return list(by_setting.values())
     alone = lambda one: one.advisable and one.case.body.kind == "quadratic"  # noqa: E731
-    return [families.get(key, one) for key, one in rows.items() if key in families or not alone(one)]
+    return [families.get(key, one) for key, one in by_setting.items() if key in families or not alone(one)]
 
 
 def _setting(one: Judged) -> str:
@@ -153,18 +153,18 @@ def cost_of_frames(frame_ns: np.ndarray, frame: float) -> Measured:
     return Measured(1e-9 * float(np.median(frame_ns)) / frame, float(np.ptp(costs)) / 2)
 
 
-def cheapest(found: Iterable[Judged], wish: Wish) -> Judged | None:
+def cheapest(rows: Iterable[Judged], wish: Wish) -> Judged | None:
     """The advisable one of least cost that meets a wish and keeps the shape; those of unknown cost come last. None
     where none does, or where the reference is less well known than is wished."""
-    meeting = [one for one in found if one.advisable and one.worst(wish) <= 1.0 and not one.untold(wish)]
+    meeting = [one for one in rows if one.advisable and one.worst(wish) <= 1.0 and not one.undecided(wish)]
     return min(meeting, key=by_cost, default=None)
 
 
-def nearest(found: Iterable[Judged], wish: Wish) -> Judged | None:
+def nearest(rows: Iterable[Judged], wish: Wish) -> Judged | None:
     """The advisable one that misses a wish, or the shape, by the smallest factor; None of those whose errors are not
     known."""
-    known = [one for one in found if one.advisable and one.worst(wish) < np.inf]
-    return min(known, key=lambda one: one.worst(wish), default=None)
+    candidates = [one for one in rows if one.advisable and one.worst(wish) < np.inf]
+    return min(candidates, key=lambda one: one.worst(wish), default=None)
 
 
 def by_cost(one: Judged) -> tuple[bool, float, float]:

@@ -26,7 +26,7 @@ ENOUGH = 1594
 """Nodes with which adaptive bodies of 95 of 100 random organs are within the target. With fewer two meshes may agree
 and both be wrong: half of the livers and spleens beyond the target with 1,194 nodes differ by less than the target from
 994 (docs/population.md)."""
-FEWER = 0.8
+COARSER_SHARE = 0.8
 """Of the finer one's nodes the coarser one has at most this share: 1,194 of 1,594 were measured, and two meshes that
 are nearly the same agree whatever both lack."""
 SHARE, SHARE_OF_HANGING = 1.5, 0.5
@@ -169,10 +169,11 @@ def _verdict(scene: str, coarse: Run, fine: Run) -> Verdict:
 
 def doubt(coarse: Case, fine: Case) -> str:
     """Why the finer of two bodies of a scene is not trusted, however near they are; empty for what was measured:
-    adaptive bodies with ENOUGH nodes, next to one with FEWER, in scenes without cuts (docs/population.md)."""
+    adaptive bodies with ENOUGH nodes, next to one with at most COARSER_SHARE of them, in scenes without cuts
+    (docs/population.md)."""
     if fine.body.nodes < ENOUGH:
         return f"meshes with fewer than {ENOUGH:,} nodes may agree and be wrong"
-    if coarse.body.nodes > FEWER * fine.body.nodes:
+    if coarse.body.nodes > COARSER_SHARE * fine.body.nodes:
         return "meshes with nearly as many nodes agree even when both are wrong"
     if fine.body.graded != ADAPTIVE:
         return "the rule is measured for adaptive bodies alone"

@@ -105,11 +105,11 @@ def _draw_percentiles(
     for body in bodies:
         for place, run in enumerate(body):
             assert run.timing is not None  # figure() chose those
-            found = {name: ns / NS_PER_MS for name, ns in percentiles(run.timing.frame_ns).items()}
+            quantiles = {name: ns / NS_PER_MS for name, ns in percentiles(run.timing.frame_ns).items()}
             colour = method_colour(run.case.method.name)
-            axes.plot([found["p50"], found["max"]], [len(labels)] * 2, color=colour, linewidth=1)
+            axes.plot([quantiles["p50"], quantiles["max"]], [len(labels)] * 2, color=colour, linewidth=1)
             for name, marker in QUANTILE_MARKERS.items():
-                axes.plot(found[name], len(labels), marker=marker, color=colour, markersize=6, markeredgewidth=1.8)
+                axes.plot(quantiles[name], len(labels), marker=marker, color=colour, markersize=6, markeredgewidth=1.8)
             labels.append(names[id(run)] if place == 0 else "")
     for deadline in DEADLINES_MS:
         axes.axvline(deadline, color=GREY, linewidth=1, linestyle=DASHES)

@@ -65,12 +65,12 @@ def figure(runs: Sequence[Run]) -> Figure:
 
 def _chosen(runs: Sequence[Run]) -> list[Run]:
     """The scene's run of each method with this body that has a last checkpoint; of several, the largest step."""
-    found: dict[str, Run] = {}
+    by_method: dict[str, Run] = {}
     for run in sorted(runs, key=lambda run: -run.record.attributes.get("dt", 0.0)):
         case = run.case
         if case.scene.name == SCENE and case.body.kind == BODY and run.record.status in COMPARABLE:
-            found.setdefault(case.method.name, run)
-    return [found[name] for name in sorted(found, key=lambda name: (name not in NAMES, name))]
+            by_method.setdefault(case.method.name, run)
+    return [by_method[name] for name in sorted(by_method, key=lambda name: (name not in NAMES, name))]
 
 
 def _radius(run: Run) -> float:

@@ -42,7 +42,7 @@ LOWEST, HIGHEST = 1e-3, 1e3
 def figure(runs: Sequence[Run]) -> Figure:
     """For each scene a panel of the force and one of the displacement below it."""
     scenes = {name: _judged(group) for name, group in by_scene(runs).items()}
-    scenes = {name: found for name, found in scenes.items() if found}
+    scenes = {name: bodies for name, bodies in scenes.items() if bodies}
     if not scenes:
         return blank(TITLE, "no frame times from this machine and this code yet")
     shown = [run for run in runs if run.case.scene.name in scenes]
@@ -54,13 +54,13 @@ def figure(runs: Sequence[Run]) -> Figure:
         for row in (0, 1):
             axes[2 * (spare // columns) + row, spare % columns].set_axis_off()
     heights: list[list[float]] = [[] for _ in range(2 * blocks)]
-    low, high = _ends([one.cost.value for found in scenes.values() for one in found] + [REAL_TIME, HALF])
-    for place, (name, found) in enumerate(scenes.items()):
+    low, high = _ends([one.cost.value for bodies in scenes.values() for one in bodies] + [REAL_TIME, HALF])
+    for place, (name, bodies) in enumerate(scenes.items()):
         column = axes[2 * (place // columns) : 2 * (place // columns) + 2, place % columns]
         group = [run for run in shown if run.case.scene.name == name]
         column[0].set_title(heading(name) + unresolved_mark(group, (FORCE, DISPLACEMENT)))
         column[0].set_xlim(low, high)
-        for row, drawn in enumerate(_draw_scene(column, found, group[0].case.scene)):
+        for row, drawn in enumerate(_draw_scene(column, bodies, group[0].case.scene)):
             heights[2 * (place // columns) + row] += drawn
     for row, metric, drawn in zip(axes, (FORCE, DISPLACEMENT) * blocks, heights, strict=True):
         row[0].set_ylim(max(LOWEST, min(drawn or [0.3])) / BELOW, ROOM * max(drawn or [60.0]))
@@ -82,17 +82,17 @@ def _ends(values: Sequence[float]) -> tuple[float, float]:
     return min(values) / SIDE, SIDE * max(values)
 
 
-def _draw_scene(column: np.ndarray, found: Sequence[Judged], scene: Scene) -> list[list[float]]:
+def _draw_scene(column: np.ndarray, bodies: Sequence[Judged], scene: Scene) -> list[list[float]]:
     """The heights drawn in each of the two panels."""
     wish, heights = usual_wish(scene), []
-    recommended = cheapest(found, wish)
+    recommended = cheapest(bodies, wish)
     for panel, metric in zip(column, (FORCE, DISPLACEMENT), strict=True):
-        points = [(one, getattr(one, FIELDS[metric.name])) for one in found]
+        points = [(one, getattr(one, FIELDS[metric.name])) for one in bodies]
         points = [(one, error) for one, error in points if error.known]
         bound = getattr(wish, FIELDS[metric.name])
         _draw_goals(panel, bound)
         if not points:
-            remark(panel, "no reference, no error" if not any(one.compared for one in found) else _why_not(metric))
+            remark(panel, "no reference, no error" if not any(one.compared for one in bodies) else _why_not(metric))
             heights.append([])
             continue
         _draw_front(panel, points)
@@ -130,8 +130,8 @@ def _draw_point(panel: Axes, one: Judged, error: Measured, field: str) -> None:
     meshes the marker is the median, and the bar goes from the smallest error to the largest."""
     look, heights = family_of(one.case), [_height(getattr(mesh, field)) for mesh in one.members or (one,)]
     height = float(np.median(heights))
-    known = error.uncertainty if error.uncertainty == error.uncertainty else 0.0
-    up, down = max(heights) - height + known, height - min(heights) + known
+    uncertainty = error.uncertainty if error.uncertainty == error.uncertainty else 0.0
+    up, down = max(heights) - height + uncertainty, height - min(heights) + uncertainty
     wide = one.cost.uncertainty if one.cost.uncertainty == one.cost.uncertainty else 0.0
     down, left = min(down, 0.95 * height), min(wide, 0.95 * one.cost.value)
     panel.errorbar(
@@ -190,38 +190,38 @@ def words_of(body: BodyRecipe) -> str:
 
 
 def _notes(scenes: dict[str, list[Judged]]) -> list[str]:
-    told = [
+    notes = [
         "Green: force within 3 % and displacement within 1 % (hollow organs 6 and 3 %) in real time on one core. Bars: "
         "uncertainty of the reference, range over five neighbouring meshes where there are five (the marker is their "
         "median), and spread of up to five timings. Nothing is drawn below the uncertainty."
     ]
-    best = {name: cheapest(found, usual_wish(found[0].case.scene)) for name, found in scenes.items()}
+    best = {name: cheapest(bodies, usual_wish(bodies[0].case.scene)) for name, bodies in scenes.items()}
     named = [f"{readable(name)}: {words_of(one.case.body)}" for name, one in best.items() if one is not None]
     lacking = [readable(name) for name, one in best.items() if one is None]
     if named:
-        told.append(f"Recommended, the cheapest that is accurate enough: {'; '.join(named)}.")
+        notes.append(f"Recommended, the cheapest that is accurate enough: {'; '.join(named)}.")
     if lacking:
-        told.append(f"No body is accurate enough and keeps the shape of its organ in {', '.join(lacking)}.")
-    return told
+        notes.append(f"No body is accurate enough and keeps the shape of its organ in {', '.join(lacking)}.")
+    return notes
 
 
 def _left_out(runs: Sequence[Run]) -> list[str]:
     """What is no point of the chart, and why."""
     ended = [f"{run.case.name} {readable(run.record.status)}" for run in runs if run.record.status != Status.OK]
     well = [run for run in runs if run.record.status == Status.OK]
-    told = remarks(well)
+    notes = remarks(well)
     if ended:
         more = f" and {len(ended) - MOST_NAMED} more" if len(ended) > MOST_NAMED else ""
-        told.append(f"Not drawn, because they failed: {', '.join(ended[:MOST_NAMED])}{more}.")
-    rows = [one for group in by_scene(well).values() for one in over_meshes(filter(None, map(judged, group)))]
-    untimed = sum(not one.cost.known for one in rows)  # of neighbouring meshes one is timed
+        notes.append(f"Not drawn, because they failed: {', '.join(ended[:MOST_NAMED])}{more}.")
+    bodies = [one for group in by_scene(well).values() for one in over_meshes(filter(None, map(judged, group)))]
+    untimed = sum(not one.cost.known for one in bodies)  # of neighbouring meshes one is timed
     if untimed:
-        told.append(f"Not drawn (no frame times for this machine and code version): {untimed}.")
-    return told
+        notes.append(f"Not drawn (no frame times for this machine and code version): {untimed}.")
+    return notes
 
 
 def _handles(scenes: dict[str, list[Judged]]) -> list[Line2D]:
-    looks = dict.fromkeys(family_of(one.case) for found in scenes.values() for one in found)
+    looks = dict.fromkeys(family_of(one.case) for bodies in scenes.values() for one in bodies)
     plain = {"linestyle": "", "markeredgecolor": "white", "markeredgewidth": 0.5}
     return [
         *(

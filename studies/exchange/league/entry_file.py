@@ -84,19 +84,19 @@ def check_entry(entry: EntryFile, scene: str) -> FrozenScene:
         raise StudyError(f"the entry is of {entry.scene}, not of {scene}")
     if scene not in frozen():
         raise StudyError(f"{scene} is not in {SET}, which has {', '.join(frozen())}")
-    found = frozen()[scene]
-    if found.held_back:
+    frozen_scene = frozen()[scene]
+    if frozen_scene.held_back:
         raise StudyError(f"{scene} of {SET} is held back: nobody can enter it before its data is published")
     key = mesh_key(entry.mesh, entry.nodes)
-    if key in found.meshes and found.meshes[key] != entry.mesh_sha256:
+    if key in frozen_scene.meshes and frozen_scene.meshes[key] != entry.mesh_sha256:
         raise StudyError(
             f"mesh_sha256 of the entry is not that of {key} of {scene} in {SET}; compute on the exported mesh "
             "and copy its SHA-256 from scene.json"
         )
-    if key not in found.meshes:
-        known = ", ".join(found.meshes)
-        raise StudyError(f"the mesh of the entry ({key}) is not one of {SET}, which has {known} of {scene}")
-    return found
+    if key not in frozen_scene.meshes:
+        meshes = ", ".join(frozen_scene.meshes)
+        raise StudyError(f"the mesh of the entry ({key}) is not one of {SET}, which has {meshes} of {scene}")
+    return frozen_scene
 
 
 def check_mesh_here(entry: EntryFile, scene: Scene) -> None:

@@ -39,7 +39,7 @@ class Deformable:
         scene.check_simple()
         if np.any(scene.data["gravity"]):
             raise CannotDo("its adapter reads the force where there is no weight")
-        self.scene, self.obstacles, self.asked = scene, scene.obstacles("plane", "sphere"), scene.asked_obstacle
+        self.scene, self.obstacles, self.probed = scene, scene.obstacles("plane", "sphere"), scene.probed_obstacle
         self.damping = damping
         pybullet.connect(pybullet.DIRECT)
         pybullet.resetSimulation(pybullet.RESET_USE_DEFORMABLE_WORLD)
@@ -108,10 +108,10 @@ class Deformable:
     def force(self, t: float) -> float:
         """The probed force [N] at time t [s]: what the elements push back at the held region, or at all free nodes that
         are nearer to the asked obstacle than to any other. At rest only touched nodes push."""
-        x, nodes = self.positions(), self.scene.asked_nodes
-        if self.asked is not None:
+        x, nodes = self.positions(), self.scene.probed_nodes
+        if self.probed is not None:
             nearest = np.argmin([gap(one, x, t)[0] for one in self.obstacles], axis=0)
-            nodes = np.setdiff1d(np.flatnonzero(nearest == self.asked), self.scene.held)
+            nodes = np.setdiff1d(np.flatnonzero(nearest == self.probed), self.scene.held)
         return self.scene.along(-self.law.forces(x)[nodes].sum(axis=0))
 
 

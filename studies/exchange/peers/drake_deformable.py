@@ -50,7 +50,7 @@ class Deformable:
     def __init__(self, scene: SceneFolder, dt: float, poisson: float, law: str, finest: float) -> None:
         """finest: edge of the triangles that stand for a sphere [m]. Raises CannotDo."""
         scene.check_simple()
-        self.scene, self.obstacles, self.asked = scene, scene.obstacles("plane", "sphere"), scene.asked_obstacle
+        self.scene, self.obstacles, self.probed = scene, scene.obstacles("plane", "sphere"), scene.probed_obstacle
         builder = DiagramBuilder()
         config = MultibodyPlantConfig(time_step=dt, discrete_contact_approximation="lagged")
         self.plant, self.graph = AddMultibodyPlant(config, builder)
@@ -59,7 +59,7 @@ class Deformable:
         self.holds: list[tuple[dict[str, Any], Any]] = []
         self.joints = [self._shape(number, one, finest) for number, one in enumerate(self.obstacles)]
         self.organ = self._organ(poisson, law)
-        if self.asked is None and law != LAW:
+        if self.probed is None and law != LAW:
             raise CannotDo("its adapter computes the force of a held region for its neo-Hookean law alone")
         self.law = StableNeoHookean(
             scene.points, scene.cells, scene.mu, 2.0 * scene.mu * poisson / (1.0 - 2.0 * poisson)
@@ -129,12 +129,12 @@ class Deformable:
     def force(self) -> float:
         """The probed force [N]: the sum of the contact forces between the body and the obstacle that is asked for, or
         what holds a region against the stresses."""
-        if self.asked is None:
-            return self.scene.along(-self.law.forces(self.positions())[self.scene.asked_nodes].sum(axis=0))
-        found = self.plant.get_contact_results_output_port().Eval(self.context)
-        contacts = [found.deformable_contact_info(number) for number in range(found.num_deformable_contacts())]
-        asked = [one for one in contacts if self.geometries[self.asked] in (one.id_A(), one.id_B())]
-        return abs(self.scene.along(sum((one.F_Ac_W().translational() for one in asked), np.zeros(3))))
+        if self.probed is None:
+            return self.scene.along(-self.law.forces(self.positions())[self.scene.probed_nodes].sum(axis=0))
+        results = self.plant.get_contact_results_output_port().Eval(self.context)
+        contacts = [results.deformable_contact_info(number) for number in range(results.num_deformable_contacts())]
+        touching = [one for one in contacts if self.geometries[self.probed] in (one.id_A(), one.id_B())]
+        return abs(self.scene.along(sum((one.F_Ac_W().translational() for one in touching), np.zeros(3))))
 
 
 def run(

@@ -24,15 +24,15 @@ def python_of(name: str, packages: Sequence[str], folder: Path) -> tuple[str, st
     if not packages:
         return sys.executable, os.pathsep.join(path or os.getcwd() for path in sys.path)
     home = (folder / name).resolve()
-    python, stamp, wanted = home / "bin" / "python", home / STAMP, "\n".join(packages)
-    if not (stamp.is_file() and stamp.read_text(encoding="utf-8").strip() == wanted):
+    python, stamp, listing = home / "bin" / "python", home / STAMP, "\n".join(packages)
+    if not (stamp.is_file() and stamp.read_text(encoding="utf-8").strip() == listing):
         venv.create(home, with_pip=True)
         pip = [python, "-m", "pip", "install", "-q", *packages, *ADAPTERS_NEED]
         ended = subprocess.run(pip, capture_output=True, text=True)
         if ended.returncode != 0:
             last = ([line for line in ended.stderr.splitlines() if line.startswith("ERROR")] or ["no reason given"])[-1]
             raise StudyError(f"pip cannot install {' '.join(packages)} ({last.removeprefix('ERROR: ')})")
-        stamp.write_text(wanted, encoding="utf-8")
+        stamp.write_text(listing, encoding="utf-8")
     alone = home / "adapters"  # nothing else of our environment may be found there
     alone.mkdir(exist_ok=True)
     link = alone / "studies"

@@ -80,10 +80,10 @@ def _contact(scene: SceneFolder, field: Any, body: Any, number: int, penalty: fl
 
 def _force(scene: SceneFolder, body: Any, contacts: list[Any], count: int) -> float:
     """The probed force [N]: what the obstacle's own point feels, turned round, or what moves the held region."""
-    asked = scene.asked_obstacle
-    result = (body if asked is None else contacts[asked]).results.force
+    probed = scene.probed_obstacle
+    result = (body if probed is None else contacts[probed]).results.force
     of_points = np.asarray(result.todense()).ravel()[: 3 * (count + len(contacts))].reshape(-1, 3)
-    nodes = scene.asked_nodes if asked is None else [count + asked]
+    nodes = scene.probed_nodes if probed is None else [count + probed]
     return scene.along(of_points[nodes].sum(axis=0))
 
 

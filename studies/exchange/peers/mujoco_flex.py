@@ -102,24 +102,24 @@ def run(
     def positions() -> np.ndarray:
         return scene.points + data.qpos[freedoms]
 
-    asked, nodes = scene.asked_obstacle, scene.asked_nodes
+    probed, nodes = scene.probed_obstacle, scene.probed_nodes
 
     def force(t: float) -> float:
-        if asked is None:
+        if probed is None:
             return scene.along(-data.qfrc_spring[freedoms[nodes]].sum(axis=0))
-        return abs(scene.along(_contact_force(model, data, asked)))
+        return abs(scene.along(_contact_force(model, data, probed)))
 
     march(scene, out, step, advance, force, positions)
 
 
-def _contact_force(model: mujoco.MjModel, data: mujoco.MjData, asked: int) -> np.ndarray:
+def _contact_force(model: mujoco.MjModel, data: mujoco.MjData, obstacle: int) -> np.ndarray:
     """Sum of the contact forces at an obstacle, up to its sign, (3,) [N]."""
-    total, found = np.zeros(3), np.zeros(6)
+    total, wrench = np.zeros(3), np.zeros(6)
     for number in range(data.ncon):
         contact = data.contact[number]
-        if asked in (model.geom_bodyid[contact.geom[0]] - 1, model.geom_bodyid[contact.geom[1]] - 1):
-            mujoco.mj_contactForce(model, data, number, found)
-            total += found[0] * contact.frame[:3]
+        if obstacle in (model.geom_bodyid[contact.geom[0]] - 1, model.geom_bodyid[contact.geom[1]] - 1):
+            mujoco.mj_contactForce(model, data, number, wrench)
+            total += wrench[0] * contact.frame[:3]
     return total
 
 

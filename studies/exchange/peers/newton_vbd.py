@@ -134,11 +134,11 @@ def _place(model: Any, shapes: list[int], scene: SceneFolder, t: float) -> None:
 def _force(scene: SceneFolder, contacts: Any, observed: Any, shapes: list[int], law: Any, now: Any) -> float:
     """The probed force [N]: the sum of the contact forces between the body and the obstacle that is asked for, or what
     holds a region against the stresses."""
-    if scene.asked_obstacle is None:
+    if scene.probed_obstacle is None:
         inside = law.forces(now.particle_q.numpy().astype(np.float64))
-        return scene.along(-inside[scene.asked_nodes].sum(axis=0))
+        return scene.along(-inside[scene.probed_nodes].sum(axis=0))
     count = int(contacts.soft_contact_count.numpy()[0])
     first = contacts.rigid_contact_max
     wrenches = observed.contact_f.numpy()[first : first + count, :3]
-    asked = contacts.soft_contact_shape.numpy()[:count] == shapes[scene.asked_obstacle]
-    return abs(scene.along(wrenches[asked].sum(axis=0)))
+    touching = contacts.soft_contact_shape.numpy()[:count] == shapes[scene.probed_obstacle]
+    return abs(scene.along(wrenches[touching].sum(axis=0)))

@@ -81,20 +81,20 @@ class SceneFolder:
         """All of them. Raises CannotDo for one that is none of these kinds, and for one with friction."""
         for obstacle in self.data["obstacles"]:
             if obstacle["kind"] not in kinds or obstacle["friction"] != 0:
-                known = " and ".join(f"{kind}s" for kind in kinds)
-                raise CannotDo(f"its adapter knows frictionless {known}, not: {obstacle['words']}")
+                plurals = " and ".join(f"{kind}s" for kind in kinds)
+                raise CannotDo(f"its adapter knows frictionless {plurals}, not: {obstacle['words']}")
         return self.data["obstacles"]
 
     @property
-    def asked_obstacle(self) -> int | None:
+    def probed_obstacle(self) -> int | None:
         """Number of the obstacle whose force is asked for; None where it is that of a held region."""
-        asked = self.data["force"]
-        return int(asked["number"]) if asked["of"] == "obstacle" else None
+        force = self.data["force"]
+        return int(force["number"]) if force["of"] == "obstacle" else None
 
     @property
-    def asked_nodes(self) -> np.ndarray:
+    def probed_nodes(self) -> np.ndarray:
         """Nodes of the held region whose force is asked for, (k,); none where it is that of an obstacle."""
-        if self.asked_obstacle is not None:
+        if self.probed_obstacle is not None:
             return np.empty(0, np.int64)
         return self.marked(self.data["held"][self.data["force"]["number"]]["point_data"])
 
@@ -125,11 +125,11 @@ class SceneFolder:
     @cached_property
     def _regions(self) -> list[tuple[dict[str, Any], np.ndarray]]:
         """Path and nodes of each held region; a node of two counts for the first."""
-        found, seen = [], np.empty(0, np.int64)
+        regions, seen = [], np.empty(0, np.int64)
         for held in self.data["held"]:
             nodes = np.setdiff1d(self.marked(held["point_data"]), seen)
-            found, seen = [*found, (held["path"], nodes)], np.union1d(seen, nodes)
-        return found
+            regions, seen = [*regions, (held["path"], nodes)], np.union1d(seen, nodes)
+        return regions
 
     @cached_property
     def held(self) -> np.ndarray:
@@ -184,7 +184,7 @@ def march(
     probed force then [N], of which the mean of the last `averaged` steps before each checkpoint counts.
 
     evaluations: of all elements' forces in a step, where that is known."""
-    found, forces, spent, begin = [scene.points], [0.0], 0.0, 0
+    snapshots, forces, spent, begin = [scene.points], [0.0], 0.0, 0
     steps = np.round(scene.times / dt).astype(int)
     for end in steps[1:]:
         sampled: list[float] = []
@@ -195,10 +195,10 @@ def march(
                 sampled.append(force(number * dt))
         spent += time.process_time() - started
         begin = end
-        found.append(positions())
+        snapshots.append(positions())
         forces.append(float(np.mean(sampled)))
     count = None if evaluations is None else int(steps[-1]) * evaluations
-    hand_in(out, scene.times, np.array(found), np.array(forces), spent / scene.data["duration"], count)
+    hand_in(out, scene.times, np.array(snapshots), np.array(forces), spent / scene.data["duration"], count)
 
 
 def hand_in(

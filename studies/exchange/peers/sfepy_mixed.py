@@ -43,7 +43,7 @@ class Body:
         scene.check_simple()
         if np.any(scene.data["gravity"]):
             raise CannotDo("its adapter knows no weight")
-        self.scene, self.obstacles, self.asked = scene, scene.obstacles("plane", "sphere"), scene.asked_obstacle
+        self.scene, self.obstacles, self.probed = scene, scene.obstacles("plane", "sphere"), scene.probed_obstacle
         self.now, self.holds = 0.0, list[Any]()
         output.set_output(quiet=True)
         mesh = Mesh.from_data("organ", scene.points, None, [scene.cells], [np.zeros(len(scene.cells), int)], ["3_4"])
@@ -148,8 +148,8 @@ class Body:
     def force(self) -> float:
         """The probed force [N]: the integral of the penalty over the facets, or what holds a region against the stress
         of the elements."""
-        if self.asked is not None:
-            push = self._values(self.contacts[self.asked], {"dw_mode": "vector"})
+        if self.probed is not None:
+            push = self._values(self.contacts[self.probed], {"dw_mode": "vector"})
             return abs(self.scene.along(push.sum(axis=(0, 2))))
         push = np.sum([self._values(term, {}) for term in self.inside], axis=0)
         nodes = self.field.get_dofs_in_region(self.holds[self.scene.data["force"]["number"]])

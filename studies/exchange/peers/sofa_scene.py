@@ -148,14 +148,14 @@ class Run(Sofa.Core.Controller):
 
     def probed(self, x: np.ndarray, t: float) -> float:
         """The force that is asked for [N]: of an obstacle, or of a held region, which balances the elements there."""
-        asked = self.scene["force"]
-        if asked["of"] == "obstacle":
-            force = contact_force(self.scene["obstacles"][asked["number"]], self.stiffness, x, t)
+        quantity = self.scene["force"]
+        if quantity["of"] == "obstacle":
+            force = contact_force(self.scene["obstacles"][quantity["number"]], self.stiffness, x, t)
         else:
             mu = self.scene["material"]["shear_modulus"]
             forces = element_forces(self.rest, self.cells, x, mu, POISSON)
-            force = -forces[self.held[asked["number"]][0]].sum(axis=0)
-        return float(force @ np.array(asked["direction"]))
+            force = -forces[self.held[quantity["number"]][0]].sum(axis=0)
+        return float(force @ np.array(quantity["direction"]))
 
     def hand_in(self) -> None:
         """Writes what `organbench judge` reads."""

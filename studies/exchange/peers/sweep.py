@@ -72,17 +72,17 @@ def _row(peer: Peer, scene: Scene, folder: Path, limit: float, environments: Pat
 
 def _numbers(record: Record, scene: Scene) -> dict[str, Any]:
     run = run_of_entry(record, reference_for(Path(), scene)) if record.status == Status.OK else None
-    found = None if run is None else judged_run(run)
-    if run is None or found is None:
+    judgement = None if run is None else judged_run(run)
+    if run is None or judgement is None:
         return {"status": str(record.status), "message": record.message}
-    force, displacement, volume = found.force.value, found.displacement.value, VOLUME(run)
+    force, displacement, volume = judgement.force.value, judgement.displacement.value, VOLUME(run)
     shares = abs(force) / SOLID[0], displacement / SOLID[1], volume / LOST
     return {
         "status": str(record.status),
         "force_end [%]": force,
         "mean_error [%]": displacement,
         "volume_worst [%]": volume,
-        COST: found.cost.value,
+        COST: judgement.cost.value,
         SHARE: max(share for share in shares if not math.isnan(share)),  # the ball's displacement is prescribed
     }
 
@@ -90,12 +90,12 @@ def _numbers(record: Record, scene: Scene) -> dict[str, Any]:
 def best(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any] | None:
     """The settings of a program with the smallest worst share of the target; of those that are AS_GOOD the cheapest,
     and of those that are AS_CHEAP the first. None where none ended well on every scene."""
-    found: dict[str, list[Mapping[str, Any]]] = {}
+    groups: dict[str, list[Mapping[str, Any]]] = {}
     for row in rows:
-        found.setdefault(row["settings"], []).append(row)
+        groups.setdefault(row["settings"], []).append(row)
     ended = [
         (max(row[SHARE] for row in group), max(row[COST] for row in group), settings)
-        for settings, group in found.items()
+        for settings, group in groups.items()
         if not any(math.isnan(row.get(SHARE, math.nan)) for row in group)
     ]
     if not ended:

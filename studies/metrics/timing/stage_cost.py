@@ -107,19 +107,19 @@ def cost_table(case: Case, frames: int = FRAMES, repeats: int = REPEATS, budget:
     runs = {PLAIN: partial(run_frames, setup, setup.start()), TIMED: partial(_timed, setup)}
     runs |= {skip.name: partial(run_frames, *skip.included(setup, setup.start())) for skip in skipped}
     with pinned(threads=1):
-        found = _in_turns(runs, repeats, budget)
+        turns = _in_turns(runs, repeats, budget)
         outside = _per_frame(setup)
     to_step = 1e-3 / setup.clock.steps
-    whole = {name: to_step * float(np.min([r[0] for r in results], axis=0).mean()) for name, results in found.items()}
+    whole = {name: to_step * float(np.min([r[0] for r in results], axis=0).mean()) for name, results in turns.items()}
     step = whole[PLAIN]
-    stages = to_step * _fastest(found[TIMED]).mean(axis=1)
+    stages = to_step * _fastest(turns[TIMED]).mean(axis=1)
     rows = [(STAGE, name, cost, "") for name, cost in zip(ROWS, stages, strict=True) if cost > 0]
     rows += [(STAGE, "rest, not attributed", step - float(stages.sum()), ""), (STAGE, "whole step", step, "")]
-    end = found[PLAIN][0][2]
+    end = turns[PLAIN][0][2]
     rows += [(SKIPPED, skip.name, whole[skip.name] - step, skip.remark(setup, end)) for skip in skipped]
     rows += [(SKIPPED if name == ENERGIES else FRAME, name, to_step * ns, "") for name, ns in outside.items()]
     table = pd.DataFrame(rows, columns=["kind", "what", "µs per step", "how much"])
-    table.attrs["turns"] = len(found[PLAIN])
+    table.attrs["turns"] = len(turns[PLAIN])
     table.insert(3, "share of the step", table["µs per step"] / step)
     return table
 
@@ -133,7 +133,7 @@ def _in_turns(runs: dict[str, partial[TimedFrames]], repeats: int, budget: float
     would end after `budget` [s], but the first."""
     for run in runs.values():
         run(frames=1)
-    found: dict[str, list[TimedFrames]] = {name: [] for name in runs}
+    turns: dict[str, list[TimedFrames]] = {name: [] for name in runs}
     shortest = dict.fromkeys(runs, 0.0)
     began, longest = perf_counter_ns(), 0
     for turn in range(repeats):
@@ -143,11 +143,11 @@ def _in_turns(runs: dict[str, partial[TimedFrames]], repeats: int, budget: float
         for name, run in runs.items():
             if shortest[name] > EXPENSIVE * shortest[PLAIN]:
                 continue
-            found[name].append(run())
-            took = float(found[name][-1][0].sum())
+            turns[name].append(run())
+            took = float(turns[name][-1][0].sum())
             shortest[name] = min(took, shortest[name]) if turn else took
         longest = perf_counter_ns() - start  # later turns leave out what is expensive, so they take no longer
-    return found
+    return turns
 
 
 def _fastest(timed: list[TimedFrames]) -> np.ndarray:

@@ -31,15 +31,15 @@ STYLES = ("-", (0, (4, 1.6)), (0, (1, 1.2)))
 @styled
 def figure(runs: Sequence[Run]) -> Figure:
     """A column for each organ, a row for each metric."""
-    found = _judged(runs)
-    organs = list(dict.fromkeys(group.organ for group in found))
+    all_groups = _judged(runs)
+    organs = list(dict.fromkeys(group.organ for group in all_groups))
     if not organs:
         return blank(TITLE, "no member has been judged yet")
     sheet = page(3.9 * len(organs) + 0.8, 6.4)
     axes = panels(sheet, len(SHOWN), len(organs), sharey=True, sharex="row")
     handles: dict[str, Line2D] = {}
     for column, organ in zip(axes.T, organs, strict=True):
-        mine = [group for group in found if group.organ == organ]
+        mine = [group for group in all_groups if group.organ == organ]
         members = {run.case.scene.name for group in mine for run in group.runs}
         column[0].set_title(f"{heading(organ)} ({len(members)})")
         for panel, (name, label) in zip(column, SHOWN.items(), strict=True):
@@ -50,7 +50,7 @@ def figure(runs: Sequence[Run]) -> Figure:
     for panel in axes[:, 0]:
         panel.set_ylabel("share of the members")
     legend = [*handles.values(), band_handle("uncertainty of the references, smallest to largest")]
-    return finish(sheet, TITLE, legend, _notes(found), columns=3)
+    return finish(sheet, TITLE, legend, _notes(all_groups), columns=3)
 
 
 def _judged(runs: Sequence[Run]) -> list[Group]:
@@ -88,10 +88,10 @@ def _draw(panel: Axes, mine: Sequence[Group], entry: Metric) -> dict[str, Line2D
     return handles
 
 
-def _notes(found: Sequence[Group]) -> list[str]:
+def _notes(all_groups: Sequence[Group]) -> list[str]:
     notes = []
-    for organ in dict.fromkeys(group.organ for group in found):
-        mine = [group.of(metric("mean_error")) for group in found if group.organ == organ]
+    for organ in dict.fromkeys(group.organ for group in all_groups):
+        mine = [group.of(metric("mean_error")) for group in all_groups if group.organ == organ]
         count, lost = max(d.count for d in mine), max(d.lost for d in mine)
         words = f"{heading(organ)}: {count} members judged"
         words += f", up to {lost} failed runs per body (its line ends below 1)" if lost else ""
@@ -107,15 +107,15 @@ def _notes(found: Sequence[Group]) -> list[str]:
 def front(runs: Sequence[Run]) -> Figure:
     """Error of 95 of 100 members against computing time; a column for each organ, a row for each metric."""
     costs = {group: cost for group in _judged(runs) if (cost := _cost(group)) == cost}
-    found = list(costs)
-    organs = list(dict.fromkeys(group.organ for group in found))
+    all_groups = list(costs)
+    organs = list(dict.fromkeys(group.organ for group in all_groups))
     if not organs:
         return blank(FRONT, "no frame times from this machine and this code yet")
     sheet = page(3.4 * len(organs) + 0.8, 6.4)
     axes = panels(sheet, len(SHOWN), len(organs), sharey="row", sharex=True)
     handles: dict[str, Line2D] = {}
     for column, organ in zip(axes.T, organs, strict=True):
-        mine = [group for group in found if group.organ == organ]
+        mine = [group for group in all_groups if group.organ == organ]
         column[0].set_title(f"{heading(organ)} ({max(len(group.runs) for group in mine)})")
         for panel, name in zip(column, SHOWN, strict=True):
             handles |= _draw_front(panel, [(costs[group], group) for group in mine], metric(name))
@@ -123,7 +123,7 @@ def front(runs: Sequence[Run]) -> Figure:
         panel.set_ylabel(f"95 of 100 members:\n{label}")
         log_axis(panel.yaxis)
     for row, name in zip(axes, SHOWN, strict=True):
-        bounds = [bound for group in found if (bound := group.of(metric(name)).bound) == bound]
+        bounds = [bound for group in all_groups if (bound := group.of(metric(name)).bound) == bound]
         row[0].set_ylim(min(bounds) / 3.0, 6.0 * max(bounds))  # labels stand above the points
     for panel in axes[-1]:
         panel.set_xlabel("computing time / simulated time [s/s]")

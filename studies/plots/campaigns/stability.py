@@ -106,11 +106,11 @@ def _modulus_axis(axes: Axes, group: Sequence[Run]) -> None:
 
 
 def _handles(placed: Sequence[Run]) -> list:
-    found = {run.record.status for run in placed}
+    statuses = {run.record.status for run in placed}
     marks = [
         Line2D([], [], marker=marker, color=colour, linestyle="", markersize=9, label=readable(status))
         for status, (colour, marker) in STATUS_LOOKS.items()
-        if status in found
+        if status in statuses
     ]
     limit = Line2D([], [], color=BLACK, linewidth=2, marker=".", label="theoretical limit at rest")
     return [*marks, limit]

@@ -47,13 +47,13 @@ def rod(tip: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 @styled
 def figure(slide: Played) -> Figure:
     """A column per moment: the whole organ, and the contact from near with its mesh."""
-    found = moments(slide)
-    sheet = page(3.7 * len(found), 7.6)
-    axes = panels(sheet, 2, len(found))
+    columns = moments(slide)
+    sheet = page(3.7 * len(columns), 7.6)
+    axes = panels(sheet, 2, len(columns))
     body = slide.prepared.setup.body
     surface = len(np.unique(body.triangles))
     low, high = _window(CAMERA.see(body.rest[:surface])[:, :2])
-    for (name, number), (whole, near) in zip(found.items(), axes.T, strict=True):
+    for (name, number), (whole, near) in zip(columns.items(), axes.T, strict=True):
         tip = tip_of(slide, number)
         x = slide.history.snapshots[number]
         _draw(whole, x, body.triangles, tip, 0.0)

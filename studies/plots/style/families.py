@@ -72,12 +72,11 @@ def family_of(case: Case) -> Family:
     if element is not None:
         return element
     volumes = SMOOTH if body.law == edge_smoothed.__name__ else body.volumes
-    known = VIRTUAL_NODES if body.cut == VIRTUAL else FAMILIES.get((body.kind, body.graded, volumes))
-    if known is not None and case.method.name == WHOLE:
-        return known
-    if (
-        known is not None and case.method.name not in OUR_METHODS
-    ):  # an entry of another program, or a method of one's own
+    family = VIRTUAL_NODES if body.cut == VIRTUAL else FAMILIES.get((body.kind, body.graded, volumes))
+    if family is not None and case.method.name == WHOLE:
+        return family
+    if family is not None and case.method.name not in OUR_METHODS:
+        # An entry of another program, or a method of one's own.
         return Family(f"{case.method.name.replace('_', ' ')}, {body.kind}", method_colour(case.method.name), "X")
     own = "" if case.method.name == WHOLE else f", {case.method.name.replace('_', ' ')}"
-    return Family(f"{body.series}{own}", GREY, "X" if known is None else known.marker)
+    return Family(f"{body.series}{own}", GREY, "X" if family is None else family.marker)

@@ -66,21 +66,21 @@ def profiles(rows: Sequence[Row]) -> Any:
     """What the chart shows."""
     from studies.plots.campaigns.league import Profiles
 
-    asked = pairs()
+    bars = pairs()
     words = tuple(
         f"force within {factor * PROFILED['force_end']:g} %,\ndisplacement within {factor * PROFILED['mean_error']:g} %"
         for factor in FACTORS
     )
     of = {
         name: {
-            (row, column): profile(rows, name, factor, asked, budget)
+            (row, column): profile(rows, name, factor, bars, budget)
             for row, budget in enumerate(BUDGETS)
             for column, factor in enumerate(FACTORS)
         }
         for name in engines([row for row in rows if row["status"] in COMPARABLE])
     }
     note = (
-        f"{len(asked)} pairs of scene and quantity (force, mean displacement) of {SET}. No tolerance is below the "
+        f"{len(bars)} pairs of scene and quantity (force, mean displacement) of {SET}. No tolerance is below the "
         "uncertainty of the reference. A pair counts from the cheapest mesh that is good enough on; one that an engine "
         "was not run on is not solved. Times: one core."
     )

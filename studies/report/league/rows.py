@@ -50,7 +50,7 @@ def _row(path: Path) -> dict[str, Any]:
     run = run_of_entry(record, None)
     scene = run.case.scene
     run = run_of_entry(record, reference_for(path, scene))
-    known = record.status in COMPARABLE
+    comparable = record.status in COMPARABLE
     row = {
         "engine": entry["engine"],
         "version": entry["version"],
@@ -65,10 +65,10 @@ def _row(path: Path) -> dict[str, Any]:
     }
     for name in COLUMNS:
         one = metric(name)
-        row[f"{name} [%]"] = one(run) if known else float("nan")
-        row[f"{name} floor [%]"] = one.uncertainty(run) if known else float("nan")
+        row[f"{name} [%]"] = one(run) if comparable else float("nan")
+        row[f"{name} floor [%]"] = one.uncertainty(run) if comparable else float("nan")
     count = entry["evaluations"]
-    cost = cost_of(run) if known else None
+    cost = cost_of(run) if comparable else None
     return row | {COST: cost.value if cost else float("nan"), COUNT: count / scene.duration if count else float("nan")}
 
 
@@ -83,29 +83,29 @@ def tolerance(name: str, factor: float, bar: float) -> float:
 
 
 def solutions(
-    rows: Sequence[Row], engine: str, factor: float, asked: Mapping[tuple[str, str], float]
+    rows: Sequence[Row], engine: str, factor: float, bars: Mapping[tuple[str, str], float]
 ) -> Iterator[tuple[tuple[str, str], Row]]:
     """Each pair that an engine solves within the tolerance, with the row in which it does."""
     for row in rows:
         for name in PROFILED:
             pair = (row["scene"], name)
-            if row["engine"] != engine or pair not in asked:
+            if row["engine"] != engine or pair not in bars:
                 continue
-            if abs(row[f"{name} [%]"]) <= tolerance(name, factor, asked[pair]):
+            if abs(row[f"{name} [%]"]) <= tolerance(name, factor, bars[pair]):
                 yield pair, row
 
 
 def profile(
-    rows: Sequence[Row], engine: str, factor: float, asked: Mapping[tuple[str, str], float], budget: str = COST
+    rows: Sequence[Row], engine: str, factor: float, bars: Mapping[tuple[str, str], float], budget: str = COST
 ) -> list[tuple[float, float]]:
     """(budget, share of the pairs that are solved within the tolerance for at most this budget), ascending; a pair
     counts from its cheapest entry that is good enough on, and not at all where no cost is known."""
     cheapest: dict[tuple[str, str], float] = {}
-    for pair, row in solutions(rows, engine, factor, asked):
+    for pair, row in solutions(rows, engine, factor, bars):
         if row[budget] == row[budget]:
             cheapest[pair] = min(cheapest.get(pair, row[budget]), row[budget])
     costs = sorted(cheapest.values())
-    return [(cost, (number + 1) / len(asked)) for number, cost in enumerate(costs)]
+    return [(cost, (number + 1) / len(bars)) for number, cost in enumerate(costs)]
 
 
 def engines(rows: Sequence[Row]) -> list[str]:
@@ -116,11 +116,11 @@ def engines(rows: Sequence[Row]) -> list[str]:
 
 def cards(rows: Sequence[Row]) -> list[dict[str, Any]]:
     """One for each engine: the range of the sizes of its errors, its cost, and what it cannot do."""
-    asked = pairs()
-    return [_card(name, [row for row in rows if row["engine"] == name], asked) for name in engines(rows)]
+    bars = pairs()
+    return [_card(name, [row for row in rows if row["engine"] == name], bars) for name in engines(rows)]
 
 
-def _card(name: str, rows: Sequence[Row], asked: Mapping[tuple[str, str], float]) -> dict[str, Any]:
+def _card(name: str, rows: Sequence[Row], bars: Mapping[tuple[str, str], float]) -> dict[str, Any]:
     judged = [row for row in rows if row["status"] in COMPARABLE]
     missing = [
         scene for scene, one in frozen().items() if not one.held_back and scene not in {r["scene"] for r in rows}
@@ -130,7 +130,7 @@ def _card(name: str, rows: Sequence[Row], asked: Mapping[tuple[str, str], float]
         if row["message"]:
             scenes = cannot.setdefault(row["message"].removeprefix(f"{name}: "), [])
             scenes += [row["scene"]] if row["scene"] not in scenes else []
-    solved = {pair for pair, _ in solutions(rows, name, 1.0, asked)}
+    solved = {pair for pair, _ in solutions(rows, name, 1.0, bars)}
     return {
         "engine": name,
         "version": rows[0]["version"],
@@ -139,7 +139,7 @@ def _card(name: str, rows: Sequence[Row], asked: Mapping[tuple[str, str], float]
         "ranges": {column: _range(judged, f"{column} [%]") for column in COLUMNS},
         "cost": _range(judged, COST),
         "count": _range(judged, COUNT),
-        "solved": f"{len(solved)} of {len(asked)}" if judged else "–",
+        "solved": f"{len(solved)} of {len(bars)}" if judged else "–",
         "missing": missing,
         "cannot": [f"{', '.join(scenes)}: {reason}" for reason, scenes in cannot.items()],
     }

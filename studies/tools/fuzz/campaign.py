@@ -21,11 +21,11 @@ def run_trials(
     """What `attempt` made of every trial, in their order; `done` hears of each."""
     trials = list(trials)
     chunks = [trials[first : first + CHUNK] for first in range(0, len(trials), CHUNK)]
-    found: dict[int, Outcome] = {}
+    outcomes: dict[int, Outcome] = {}
     for outcome in _each(chunks, jobs, attempt):
-        found[outcome.trial.number] = outcome
+        outcomes[outcome.trial.number] = outcome
         done(outcome)
-    return [found[trial.number] for trial in trials]
+    return [outcomes[trial.number] for trial in trials]
 
 
 def _each(chunks: list[list[Choices]], jobs: int, attempt: Attempt) -> Iterator[Outcome]:
@@ -52,6 +52,6 @@ def table_of(outcomes: Iterable[Outcome]) -> pd.DataFrame:
 
 def counts(table: pd.DataFrame, by: str = "method") -> pd.DataFrame:
     """How many trials ended how: a row for each method, or value of `by`, a column for each status, and of all."""
-    found = pd.DataFrame(pd.crosstab(table[by], table["status"], margins=True, margins_name="all"))
-    first = [name for name in ("ok", "refused") if name in found]
-    return found.reindex(columns=[*first, *sorted(set(found) - {*first, "all"}), "all"])
+    tally = pd.DataFrame(pd.crosstab(table[by], table["status"], margins=True, margins_name="all"))
+    first = [name for name in ("ok", "refused") if name in tally]
+    return tally.reindex(columns=[*first, *sorted(set(tally) - {*first, "all"}), "all"])

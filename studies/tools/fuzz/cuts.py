@@ -131,21 +131,21 @@ def draw(seed: int, number: int) -> CutTrial:
 
 def _fitted(drawn: dict[str, Any], rng: np.random.Generator) -> dict[str, Any]:
     """Other choices for those that are refused with the organ, body and way of cutting drawn."""
-    organ, body, found = drawn["organ"], drawn["body"], {}
+    organ, body, choices = drawn["organ"], drawn["body"], {}
     if organ in HOLLOW:
         body = body if body in LINEAR else LINEAR[int(rng.integers(len(LINEAR)))]
-        found = {"body": body, "contact": False, "pull": abs(drawn["pull"])}
+        choices = {"body": body, "contact": False, "pull": abs(drawn["pull"])}
     way = drawn["way"] if body in LINEAR and organ not in HOLLOW else "conforming"
-    found |= {"way": way, "opens": organ in HOLLOW}
+    choices |= {"way": way, "opens": organ in HOLLOW}
     if organ in HOLLOW and drawn["blade"] == "ball":
-        found["blade"] = "half space"
+        choices["blade"] = "half space"
     if body == SURFACE:
-        found |= {"blade": "none", "advance": 0.0}
+        choices |= {"blade": "none", "advance": 0.0}
     if way == VIRTUAL:
-        found |= {"contact": False, "advance": 0.0}
-    if drawn["held"] == "one end" and found.get("blade", drawn["blade"]) == "none":
-        found["free"] = True
-    return found
+        choices |= {"contact": False, "advance": 0.0}
+    if drawn["held"] == "one end" and choices.get("blade", drawn["blade"]) == "none":
+        choices["free"] = True
+    return choices
 
 
 def tried(trial: CutTrial) -> Outcome:

@@ -69,13 +69,13 @@ def _run(trial: Trial) -> tuple[str, str]:
 
 def simplest(outcome: Outcome, most: int = 200, attempt: Attempt = tried) -> Outcome:
     """A trial with as few choices off the gentlest as still ends in that status, tried choice by choice."""
-    found, waiting = outcome, deque(outcome.trial.gentler())
+    best, waiting = outcome, deque(outcome.trial.gentler())
     while waiting and most > 0:
         most -= 1
         simpler = attempt(waiting.popleft())
         if simpler.status == outcome.status and _kind(simpler) == _kind(outcome):
-            found, waiting = simpler, deque(simpler.trial.gentler())
-    return found
+            best, waiting = simpler, deque(simpler.trial.gentler())
+    return best
 
 
 def _kind(outcome: Outcome) -> str:

@@ -117,17 +117,17 @@ def _fitted(drawn: dict[str, Any], rng: np.random.Generator) -> dict[str, Any]:
         law = _one(rng, WITH_LENGTH)
     if able.keeps == "elements":
         volumes, law = "nodal", _one(rng, WITHOUT_LENGTH)
-    found: dict[str, Any] = {"kind": kind, "volumes": volumes, "law": law}
-    found |= {} if able.float32 and kind != QUADRATIC else {"precision": "float64"}
-    found |= {} if able.threads else {"threads": 1}
-    found |= {} if able.targets else {"target": 1.0}
+    choices: dict[str, Any] = {"kind": kind, "volumes": volumes, "law": law}
+    choices |= {} if able.float32 and kind != QUADRATIC else {"precision": "float64"}
+    choices |= {} if able.threads else {"threads": 1}
+    choices |= {} if able.targets else {"target": 1.0}
     if drawn["load"] == "probe" and (not able.thin_probes or kind == QUADRATIC):
-        found["load"] = "sphere"
-    if drawn["start"] != "rest" and found.get("load", drawn["load"]) not in ("none", "jump"):
-        found |= {"start": "rest"} if rng.random() < 0.5 else {"load": "none"}
+        choices["load"] = "sphere"
+    if drawn["start"] != "rest" and choices.get("load", drawn["load"]) not in ("none", "jump"):
+        choices |= {"start": "rest"} if rng.random() < 0.5 else {"load": "none"}
     if drawn["shape"] in ("two", "cell") and volumes == "regions":
-        found["volumes"] = "whole"
-    return found
+        choices["volumes"] = "whole"
+    return choices
 
 
 def _method(drawn: dict[str, Any]) -> type[Method]:

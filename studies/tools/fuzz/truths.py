@@ -60,17 +60,17 @@ def _wrong_volume(setup: Setup, history: History) -> str | None:
     ):
         return None
     middle = history.final.mean(axis=0)
-    found = signed_volume(history.final - middle, body.triangles.astype(np.int64))
+    volume = signed_volume(history.final - middle, body.triangles.astype(np.int64))
     allowed = _allowed(setup) / body.size * body.size**3
-    if abs(found - float(history.volume[-1, 0])) > allowed:
-        return f"the recorded volume is {history.volume[-1, 0]:.6g} m³, the surface encloses {found:.6g} m³"
+    if abs(volume - float(history.volume[-1, 0])) > allowed:
+        return f"the recorded volume is {history.volume[-1, 0]:.6g} m³, the surface encloses {volume:.6g} m³"
     return None
 
 
 def _moved_hold(setup: Setup, history: History) -> str | None:
     for attachment in setup.attachments:
-        wanted = setup.body.rest[attachment.nodes] + attachment.path(setup.clock.duration)
-        off = float(np.abs(history.final[attachment.nodes] - wanted).max())
+        positions = setup.body.rest[attachment.nodes] + attachment.path(setup.clock.duration)
+        off = float(np.abs(history.final[attachment.nodes] - positions).max())
         if off > _allowed(setup):
             return f"a clamped node is {off:.3g} m from its prescribed position"
     return None
@@ -84,8 +84,8 @@ def _inside(setup: Setup, history: History) -> str | None:
             continue
         deepest = max(0.0, -float(obstacle.gap(final, end).min()))
         if abs(deepest - max(0.0, float(history.penetration[-1, number]))) > _allowed(setup):
-            told = history.penetration[-1, number]
-            return f"a node is {deepest:.3g} m inside obstacle {number}, the record says {told:.3g} m"
+            record = history.penetration[-1, number]
+            return f"a node is {deepest:.3g} m inside obstacle {number}, the record says {record:.3g} m"
     return None
 
 

@@ -27,13 +27,13 @@ def mesh_of(trial: ReferenceTrial) -> MeshTet:
 def _sound(trial: ReferenceTrial, rng: np.random.Generator) -> MeshTet:
     size = 1 + trial.nodes % 3
     if trial.shape in ORGANS:
-        found = organ(trial.shape, ORGAN_NODES[0])
-        return tetrahedra(found.points, found.tetrahedra)
+        body = organ(trial.shape, ORGAN_NODES[0])
+        return tetrahedra(body.points, body.tetrahedra)
     if trial.shape == "octant":
         return _scaled(ball_octant(size))
     if trial.shape == SHELL:
-        found = shell_octant(INNER, 2 + trial.nodes % 2, size - size // 3)
-        return _scaled(found if trial.nodes % 2 else straight(found))
+        body = shell_octant(INNER, 2 + trial.nodes % 2, size - size // 3)
+        return _scaled(body if trial.nodes % 2 else straight(body))
     if trial.shape == "box":
         ends = [np.sort([0.0, *rng.random(1 + size // 2), 1.0]) for _ in range(3)]
         return _scaled(MeshTet.init_tensor(*ends))

@@ -27,18 +27,18 @@ class TimedOut(Exception):
 class Reached:
     """The last state that converged, as far as a trial has come."""
 
-    found: Equilibrium | None = None
+    equilibrium: Equilibrium | None = None
     state: State | None = None
     """Its unknowns; None in a motion."""
     count: int = 0
 
-    def step(self, found: Equilibrium) -> None:
+    def step(self, moment: Equilibrium) -> None:
         """Hears of a moment of a motion."""
-        self.found, self.count = found, self.count + 1
+        self.equilibrium, self.count = moment, self.count + 1
 
     def checkpoint(self, point: Checkpoint) -> None:
         """Hears of a state of rest."""
-        self.found, self.state, self.count = point.path[-1], point.state, len(point.path)
+        self.equilibrium, self.state, self.count = point.path[-1], point.state, len(point.path)
 
 
 @dataclass(frozen=True)
@@ -84,12 +84,12 @@ def _run(trial: ReferenceTrial, ask: Callable[[], None], reached: Reached) -> tu
             return UNEXPLAINED, f"the error reports {len(stuck.converged)} states of {reached.count}: {stuck}"
     except TimedOut:
         status, message = "timed-out", f"{reached.count} of {trial.steps} requested times reached"
-    if reached.found is None:
+    if reached.equilibrium is None:
         return status, message
-    wrong = broken(system, reached.found, reached.state)
+    wrong = broken(system, reached.equilibrium, reached.state)
     if wrong:
         return UNEXPLAINED, wrong
-    least, flattest = corner_ratio(system, reached.found.u)
+    least, flattest = corner_ratio(system, reached.equilibrium.u)
     if status == "ok" and flattest <= 0.0:
         return "inverted", f"an element is inverted at a corner at rest (volume ratio {flattest:.3g})"
     if status == "ok" and least <= 0.0:

@@ -16,12 +16,12 @@ CHOICES = "element", "law", "kappa/mu", "load", "body"
 def counts_by_choice(table: pd.DataFrame) -> pd.DataFrame:
     """How many trials ended how: a row for each value of some choices and one for all, a column for each status."""
     low = 2 * np.floor(np.log10(table["bulk"]) / 2.0).astype(int)
-    told = table.assign(**{"kappa/mu": [f"1e{k} to 1e{k + 2}" for k in low], "body": table["shape"]})
+    trials = table.assign(**{"kappa/mu": [f"1e{k} to 1e{k + 2}" for k in low], "body": table["shape"]})
     rows = []
     for choice in CHOICES:
-        found = counts(told, choice).reset_index(names="value")
-        rows.append(found[found["value"] != "all"].assign(choice=choice))
-    rows.append(found[found["value"] == "all"].assign(choice="all"))
+        part = counts(trials, choice).reset_index(names="value")
+        rows.append(part[part["value"] != "all"].assign(choice=choice))
+    rows.append(part[part["value"] == "all"].assign(choice="all"))
     whole = pd.concat(rows, ignore_index=True)
     return whole.reindex(columns=["choice", *(name for name in whole if name != "choice")])
 
@@ -32,9 +32,9 @@ def last_states(outcomes: Iterable[Outcome]) -> bytes:
     for outcome in outcomes:
         if not isinstance(outcome, ReferenceOutcome) or outcome.status not in ("not-converged", "timed-out"):
             continue
-        found = outcome.reached.found
-        if found is not None:
-            parts = {"t": np.asarray(found.t), "u": found.u, "p": found.p}
+        equilibrium = outcome.reached.equilibrium
+        if equilibrium is not None:
+            parts = {"t": np.asarray(equilibrium.t), "u": equilibrium.u, "p": equilibrium.p}
             arrays |= {f"{outcome.trial.number}/{name}": values for name, values in parts.items()}
     target = BytesIO()
     np.savez_compressed(target, allow_pickle=False, **arrays)

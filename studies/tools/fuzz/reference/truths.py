@@ -22,37 +22,40 @@ CORNERS = np.vstack((np.zeros(3), np.eye(3), np.full(3, 0.25))).T
 """And the middle."""
 
 
-def broken(system: System, found: Equilibrium, state: State | None) -> str | None:
+def broken(system: System, equilibrium: Equilibrium, state: State | None) -> str | None:
     """The first truth that a state does not meet, as a sentence; None when all hold.
 
-    state: the unknowns behind `found`; None for a moment of a motion, whose forces do not balance at one instant.
+    state: the unknowns behind `equilibrium`; None for a moment of a motion, whose forces do not balance at one instant.
     """
-    measured = always(system, found) if state is None else at_rest(system, found, state)
+    measured = always(system, equilibrium) if state is None else at_rest(system, equilibrium, state)
     return next((sentence for wrong, sentence in measured if wrong), None)
 
 
-def always(system: System, found: Equilibrium) -> Iterator[tuple[bool, str]]:
+def always(system: System, equilibrium: Equilibrium) -> Iterator[tuple[bool, str]]:
     """Of a state of rest and of a moment alike."""
     names = ("u", "p", "obstacle_force", "held_force", "reaction", "J", "cavity_pressure", "energy")
-    kinetic = found.kinetic if isinstance(found, Moment) else 0.0
-    for name in (*names, "v", "a") if isinstance(found, Moment) else names:
-        yield not np.isfinite(getattr(found, name)).all(), f"'{name}' has a number that is not finite"
-    yield not found.J.min() > 0.0, f"the least volume ratio is {found.J.min():.3g} where the elements are integrated"
+    kinetic = equilibrium.kinetic if isinstance(equilibrium, Moment) else 0.0
+    for name in (*names, "v", "a") if isinstance(equilibrium, Moment) else names:
+        yield not np.isfinite(getattr(equilibrium, name)).all(), f"'{name}' has a number that is not finite"
+    yield (
+        not equilibrium.J.min() > 0.0,
+        f"the least volume ratio is {equilibrium.J.min():.3g} where the elements are integrated",
+    )
     least = -ROUND_OFF * system.problem.material.mu * system.volume
-    yield min(found.energy, kinetic) < least, f"the energies are {found.energy:.3g} and {kinetic:.3g} J"
-    inside = enclosed(system, found.u)
-    off = abs(found.volume / inside - 1.0) if inside is not None else 0.0
+    yield min(equilibrium.energy, kinetic) < least, f"the energies are {equilibrium.energy:.3g} and {kinetic:.3g} J"
+    inside = enclosed(system, equilibrium.u)
+    off = abs(equilibrium.volume / inside - 1.0) if inside is not None else 0.0
     yield off > ROUND_OFF, f"the reported volume differs by {off:.3g} from the volume of the surface"
 
 
-def at_rest(system: System, found: Equilibrium, state: State) -> Iterator[tuple[bool, str]]:
+def at_rest(system: System, equilibrium: Equilibrium, state: State) -> Iterator[tuple[bool, str]]:
     """Of an equilibrium: all of that, and its balance, its volume and its depth in the obstacles."""
-    yield from always(system, found)
-    off, allowed = unbalanced(system, found, state)
+    yield from always(system, equilibrium)
+    off, allowed = unbalanced(system, equilibrium, state)
     yield off > allowed, f"forces of {off:.3g} N are out of balance, {allowed:.3g} N allowed"
-    off, allowed = unequal(system, found, state)
+    off, allowed = unequal(system, equilibrium, state)
     yield off > allowed, f"nodes without contact feel {off:.3g} N, {allowed:.3g} N allowed"
-    off, allowed = pressure_gap(system, found, state), system.settings.volume_tol + ROUND_OFF
+    off, allowed = pressure_gap(system, equilibrium, state), system.settings.volume_tol + ROUND_OFF
     yield off > allowed, f"V/V0 - 1 is {off:.3g} off the mean pressure over kappa, {allowed:.3g} allowed"
     deep, moved = depth(system, state), float(np.abs(state.x[: system.displacement_count]).max())
     allowed = system.settings.penetration_tol * moved + ROUND_OFF * float(np.ptp(system.nodes))
@@ -77,17 +80,17 @@ def wall(system: System, u: np.ndarray, table: np.ndarray) -> tuple[np.ndarray, 
     return np.einsum("qa,fai->fqi", values, y), np.cross(y_r, y_s) * weights[:, None]
 
 
-def sizes(system: System, found: Equilibrium) -> float:
+def sizes(system: System, equilibrium: Equilibrium) -> float:
     """The forces at work [N], that the tolerance of forces is a share of."""
     weight = system.problem.density * system.volume * np.linalg.norm(np.asarray(system.problem.gravity))
-    area = np.sum(np.linalg.norm(wall(system, found.u, facet_nodes(system.problem.mesh))[1], axis=-1))
-    filled = np.abs(found.cavity_pressure).sum() * area
+    area = np.sum(np.linalg.norm(wall(system, equilibrium.u, facet_nodes(system.problem.mesh))[1], axis=-1))
+    filled = np.abs(equilibrium.cavity_pressure).sum() * area
     floor = ROUND_OFF * system.problem.material.mu * system.volume ** (2.0 / 3.0)
-    at_work = (np.linalg.norm(found.reaction), np.abs(found.obstacle_force).sum(), weight, filled, floor)
+    at_work = (np.linalg.norm(equilibrium.reaction), np.abs(equilibrium.obstacle_force).sum(), weight, filled, floor)
     return float(max(at_work))
 
 
-def unbalanced(system: System, found: Equilibrium, state: State) -> tuple[float, float]:
+def unbalanced(system: System, equilibrium: Equilibrium, state: State) -> tuple[float, float]:
     """(|contact + held + weight| [N], what the tolerance allows); a lumen pushes on nothing else than the body.
 
     Of a body cut at planes of symmetry only the weight and the obstacles count across a lumen's open side: there the
@@ -96,9 +99,10 @@ def unbalanced(system: System, found: Equilibrium, state: State) -> tuple[float,
     if system.lumens:
         return 0.0, 0.0
     weight = state.load * system.problem.density * system.volume * np.asarray(system.problem.gravity)
-    total = found.obstacle_force.sum(axis=0) + found.held_force.sum(axis=0) + weight
+    total = equilibrium.obstacle_force.sum(axis=0) + equilibrium.held_force.sum(axis=0) + weight
     free = np.sqrt(system.displacement_count)
-    return float(np.linalg.norm(total)), free * system.settings.force_tol * sizes(system, found) + _noise(system, state)
+    allowed = free * system.settings.force_tol * sizes(system, equilibrium) + _noise(system, state)
+    return float(np.linalg.norm(total)), allowed
 
 
 def _noise(system: System, state: State) -> float:
@@ -111,7 +115,7 @@ def _stress(system: System, state: State) -> np.ndarray:
     return system.problem.material.stress(*deformation(state.x, system.elements, system.problem.material.kappa))
 
 
-def unequal(system: System, found: Equilibrium, state: State) -> tuple[float, float]:
+def unequal(system: System, equilibrium: Equilibrium, state: State) -> tuple[float, float]:
     """(norm of internal force and weight at free unknowns that no obstacle and no lumen touches [N], allowed)."""
     mesh, gradients = system.problem.mesh, system.elements.gradients
     table = displacement_table(mesh, system.element)
@@ -124,7 +128,7 @@ def unequal(system: System, found: Equilibrium, state: State) -> tuple[float, fl
     quiet = quiet[: force.size].reshape(-1, 3)
     quiet[_touched(system, state)] = False
     off = float(np.linalg.norm(force[quiet]))
-    return off, system.settings.force_tol * sizes(system, found) + _noise(system, state)
+    return off, system.settings.force_tol * sizes(system, equilibrium) + _noise(system, state)
 
 
 def _touched(system: System, state: State) -> np.ndarray:
@@ -141,10 +145,10 @@ def _touched(system: System, state: State) -> np.ndarray:
     return np.unique(table[pressed])
 
 
-def pressure_gap(system: System, found: Equilibrium, state: State) -> float:
+def pressure_gap(system: System, equilibrium: Equilibrium, state: State) -> float:
     """How far V/V0 - 1, from the surface where it can be, is off the mean of p / kappa."""
-    inside = enclosed(system, found.u)
-    volume = found.volume if inside is None else inside
+    inside = enclosed(system, equilibrium.u)
+    volume = equilibrium.volume if inside is None else inside
     _, p = deformation(state.x, system.elements, system.problem.material.kappa)
     mean = float(np.sum(system.elements.weights * p)) / system.volume
     return abs(volume / system.volume - 1.0 - mean / system.problem.material.kappa)

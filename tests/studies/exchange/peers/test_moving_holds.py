@@ -95,7 +95,7 @@ def test_held_nodes_go_their_way(tmp_path, mesh_cache):
     export(BALL_CLAMPED, tmp_path / "scene", 150)
     given = SceneFolder(tmp_path / "scene")
     parts = [given.marked(f"held_{region.name}") for region in BALL_CLAMPED.held]
-    assert given.asked_obstacle is None and list(given.asked_nodes) == list(parts[BALL_CLAMPED.probed.number])
+    assert given.probed_obstacle is None and list(given.probed_nodes) == list(parts[BALL_CLAMPED.probed.number])
     for t in (0.0, 1.1, 3.0, 4.0):
         wanted = [given.points[nodes] + one.path(t) for nodes, one in zip(parts, BALL_CLAMPED.held, strict=True)]
         assert given.held_at(t) == pytest.approx(np.concatenate(wanted), abs=1e-15)

@@ -93,7 +93,7 @@ def pressed():
     """A system, and a state of rest below a plane."""
     task, reached = task_of(PRESSED), Reached()
     equilibrium_path(task.problem, task.times, task.newton, on_checkpoint=reached.checkpoint)
-    return System(task.problem, task.newton), reached.found, reached.state
+    return System(task.problem, task.newton), reached.equilibrium, reached.state
 
 
 def test_a_state_of_rest_meets_every_truth(pressed):
@@ -152,7 +152,7 @@ def test_counts_and_last_states_are_stored():
     assert set(table[table["choice"] == "element"]["value"]) == {"P1", "P2/P1"}
     with np.load(BytesIO(last_states(outcomes))) as stored:
         assert {name.split("/")[0] for name in stored} == {"5"}
-        found = outcomes[1].reached.found
+        found = outcomes[1].reached.equilibrium
         assert found is not None
         np.testing.assert_array_equal(stored["5/u"], found.u)
 
