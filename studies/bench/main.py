@@ -64,10 +64,10 @@ def reference_lines() -> list[BenchLine]:
     path = equilibrium_path(problem, times)
     scale = BALL_SQUEEZE.tissue.shear_modulus * RADIUS**2
     lines = []
-    for share, found in zip(APPROACHES, path, strict=True):
+    for share, equilibrium in zip(APPROACHES, path, strict=True):
         force, equator = BALL_BETWEEN_PLANES[share]
-        got = float(-whole_forces(BALL_SQUEEZE, found.obstacle_force[None])[0, 0, 2]) / scale
-        radius = float(np.hypot(*(problem.mesh.doflocs[:2] + found.u.T[:2])).max()) / RADIUS
+        got = float(-whole_forces(BALL_SQUEEZE, equilibrium.obstacle_force[None])[0, 0, 2]) / scale
+        radius = float(np.hypot(*(problem.mesh.doflocs[:2] + equilibrium.u.T[:2])).max()) / RADIUS
         lines.append(BenchLine(f"reference force at d = {share:.2f}, deviation", abs(got / force - 1), "1", 5e-3))
         lines.append(
             BenchLine(f"reference equator at d = {share:.2f}, deviation", abs(radius / equator - 1), "1", 5e-4)
@@ -92,12 +92,12 @@ def speed_lines() -> list[BenchLine]:
 def path_lines() -> list[BenchLine]:
     """Ten load steps with contact on a mesh of about 45,000 unknowns (twelve cells to an edge: 49,000), on one core."""
     with pinned(threads=1):
-        found = reference_bench.contact_path(cells=12, steps=10)
-    note = f"{found['unknowns']} unknowns, ten load steps, one thread on one core"
+        cost = reference_bench.contact_path(cells=12, steps=10)
+    note = f"{cost['unknowns']} unknowns, ten load steps, one thread on one core"
     return [
-        BenchLine("quasi-static path with contact", found["wall_s"], "s", 240.0, note=note),
-        BenchLine("its peak memory", found["peak_bytes"] / 1e9, "GB", 3.0, note=f"{note}; of the whole process"),
-        BenchLine("its Newton iterations per step, median", float(np.median(found["iterations"])), "1", 6.0, note=note),
+        BenchLine("quasi-static path with contact", cost["wall_s"], "s", 240.0, note=note),
+        BenchLine("its peak memory", cost["peak_bytes"] / 1e9, "GB", 3.0, note=f"{note}; of the whole process"),
+        BenchLine("its Newton iterations per step, median", float(np.median(cost["iterations"])), "1", 6.0, note=note),
     ]
 
 

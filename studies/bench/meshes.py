@@ -168,7 +168,7 @@ def promises(each: int = 2) -> Iterator[tuple[str, float, str, float, bool, str]
         start = time.perf_counter()
         mesh = organ("liver", 19_000)
         seconds = time.perf_counter() - start
-        found = {name: convergence(name) for name in ORGANS}
+        convergences = {name: convergence(name) for name in ORGANS}
     yield "liver of 19,000 nodes, surface and fill", seconds, "s", 25.0, True, f"{len(mesh.tetrahedra)} elements"
     for k, (what, target, at_most) in enumerate(
         (
@@ -177,8 +177,8 @@ def promises(each: int = 2) -> Iterator[tuple[str, float, str, float, bool, str]
             ("observed order of the volume, curved", 3.5, False),
         )
     ):
-        worst = (max if at_most else min)(ORGANS, key=lambda name, k=k: found[name][k])
-        yield what, found[worst][k], "1", target, at_most, f"worst: {worst}"
+        worst = (max if at_most else min)(ORGANS, key=lambda name, k=k: convergences[name][k])
+        yield what, convergences[worst][k], "1", target, at_most, f"worst: {worst}"
 
 
 def main() -> int:

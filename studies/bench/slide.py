@@ -62,13 +62,13 @@ def updates_ns(step_ns: np.ndarray, dt: float, span: float) -> np.ndarray:
 
     step_ns: (repeat, steps). The runs that begin at the first steps, as many as the longest update has, in a row.
     """
-    found = []
+    times = []
     for start in range(int(np.ceil(span / dt - SAME))):
         steps = steps_of_updates(step_ns.shape[1] - start, dt, span)
         ends = start + np.cumsum(steps)
         total = np.cumsum(np.pad(step_ns, ((0, 0), (1, 0))), axis=1)
-        found.append(total[:, ends] - total[:, ends - steps])
-    return np.concatenate(found, axis=1)
+        times.append(total[:, ends] - total[:, ends - steps])
+    return np.concatenate(times, axis=1)
 
 
 def counted_ns(frames: int) -> np.ndarray:
@@ -105,9 +105,9 @@ def slide_lines() -> list[BenchLine]:
     ]
     restless = percentiles(counting)["p99"] / kernel_ns(counting)
     for what, ns, span, needs in late:
-        found = percentiles(ns)
-        note = f"{needs}; median {1e-6 * found['p50']:.3g}"
-        lines.append(BenchLine(f"stomach_slide: {what}", 1e-6 * found["p99"], "ms", 1e3 * span, note=note))
+        quantiles = percentiles(ns)
+        note = f"{needs}; median {1e-6 * quantiles['p50']:.3g}"
+        lines.append(BenchLine(f"stomach_slide: {what}", 1e-6 * quantiles["p99"], "ms", 1e3 * span, note=note))
     what = "a loop of plain Python, at its fastest as long as that step with its call: the limit of the machine"
     note = f"p99; {restless:.3g} times the fastest"
     return [*lines, BenchLine(what, 1e-6 * restless * kernel_ns(step_ns), "ms", note=note)]

@@ -42,12 +42,12 @@ def fitted_youngs(beam: Beam) -> float:
 
     The sag of a slender beam is nearly 1/E: E ← E sag/measured, until they are equal. Raises SolveError.
     """
-    youngs, wanted = FIRST_GUESS, measured_row(LOADS[0]).sag
+    youngs, measured_sag = FIRST_GUESS, measured_row(LOADS[0]).sag
     while True:
         sag = 1e3 * float(reference_rest(beam, youngs, LOADS[0]).mean())
-        if abs(sag / wanted - 1.0) < CLOSE:
+        if abs(sag / measured_sag - 1.0) < CLOSE:
             return youngs
-        youngs *= sag / wanted
+        youngs *= sag / measured_sag
 
 
 def fitted_damping() -> float:

@@ -64,5 +64,5 @@ def damped_cosine(
         return basis @ np.linalg.lstsq(basis, value, rcond=None)[0] - value
 
     bounds = ([0.5 * frequency, -0.2], [2.0 * frequency, 0.9])
-    found = least_squares(left, [frequency, damping], bounds=bounds, x_scale=[frequency, 0.1], xtol=1e-12).x
-    return float(found[0]), float(found[1])
+    fit = least_squares(left, [frequency, damping], bounds=bounds, x_scale=[frequency, 0.1], xtol=1e-12).x
+    return float(fit[0]), float(fit[1])

@@ -47,5 +47,5 @@ def judged_problem(scene: Scene, mesh: JudgeMesh) -> Problem:
 
 def held_at(points: np.ndarray, path: Callable) -> PrescribedDisplacement:
     """Held at these nodes (n, 3) [m] of the mesh and at no others."""
-    known = {point.tobytes() for point in points}
-    return PrescribedDisplacement(where=lambda x: np.array([point.tobytes() in known for point in x.T]), motion=path)
+    places = {point.tobytes() for point in points}
+    return PrescribedDisplacement(where=lambda x: np.array([point.tobytes() in places for point in x.T]), motion=path)

@@ -51,11 +51,11 @@ class OrganSolution:
     def displacement(self, points: np.ndarray) -> np.ndarray:
         """(n, 3) [m] at rest points (n, 3) [m], about the middle between the held regions; of a place on a cut that
         behind it."""
-        cut, found = self.scene.cut, np.empty_like(points)
+        cut, displacements = self.scene.cut, np.empty_like(points)
         sides = np.zeros(len(points), bool) if cut is None else cut.plane.level(points) > 0
         for front in np.unique(sides):
-            found[sides == front] = self._on_side(points[sides == front], front)
-        return centred(self.scene, found)
+            displacements[sides == front] = self._on_side(points[sides == front], front)
+        return centred(self.scene, displacements)
 
     def opening(self, points: np.ndarray) -> np.ndarray:
         """Displacement in front of the scene's cut less that behind it, (n, 3) [m], at `points` (n, 3) [m] of it."""
@@ -155,9 +155,9 @@ def reference_of(root: Path, scene: Scene) -> Reference:
     for reference_solve in reference_solves(scene):
         if why_stale(reference_solve.path(root), reference_solve.key, reference_fingerprint()) is not None:
             solve(root, reference_solve)
-    found = load_reference(root, scene)
-    assert found is not None  # the scene has a plan
-    return found
+    reference = load_reference(root, scene)
+    assert reference is not None  # the scene has a plan
+    return reference
 
 
 def verdict(judge: Judge, reference: Reference) -> Outcome:
