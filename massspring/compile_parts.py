@@ -30,14 +30,14 @@ def kept_function(function: Function, **options: Any) -> Function:
     twin.__qualname__, twin.__module__ = f"{function.__qualname__}.part", function.__module__
     options = {"cache": True, "no_cfunc_wrapper": True, **options}
     with kept():
-        made: Any = numba.njit(**options)(function)
+        whole: Any = numba.njit(**options)(function)
         part: Any = numba.njit(**options | {"no_cpython_wrapper": True, "pipeline_class": PartCompiler})(twin)
-    if made is not function:
-        made.get_overload = part.get_overload
-        made.get_call_template = lambda args, named: part.get_call_template(
+    if whole is not function:
+        whole.get_overload = part.get_overload
+        whole.get_call_template = lambda args, named: part.get_call_template(
             [types.unliteral(arg) for arg in args], {name: types.unliteral(arg) for name, arg in named.items()}
         )
-    return made
+    return whole
 
 
 class Part(JITCodeLibrary):

@@ -39,8 +39,8 @@ def iteration_costs(cells: int = 7, repeats: int = 7, solver: str = "auto"):
     x = 1e-4 * np.random.default_rng(0).standard_normal(system.total)
     x[system.pattern.held] = 0.0
     loads = Loads(0.0, system.rows, system.rest().multiplier)
-    found = system.evaluate(x, loads)
-    upper, right = system.pattern.upper(found.values), -found.residual[system.pattern.free]
+    evaluation = system.evaluate(x, loads)
+    upper, right = system.pattern.upper(evaluation.values), -evaluation.residual[system.pattern.free]
     assembly = fastest(lambda: system.evaluate(x, loads), repeats)
     factor = fastest(lambda: system.solver.factor(upper), repeats)
     solve = fastest(lambda: system.solver.solve(right), repeats)

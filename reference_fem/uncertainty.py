@@ -135,10 +135,10 @@ def field_error(sizes: Sequence[float], values: Sequence, weights: np.ndarray, b
     if len(scaled) == 2:
         return mesh_error(sizes, scaled, believed)
     near, far = scaled[1] - scaled[0], scaled[2] - scaled[1]
-    known = np.array([_dot(near, near), _dot(far, far), _dot(near, far)])
-    if known[0] >= known[1]:
+    products = np.array([_dot(near, near), _dot(far, far), _dot(near, far)])
+    if products[0] >= products[1]:
         return MeshError(SCATTER * max(_norm(near), _norm(far), _norm(scaled[2] - scaled[0])), 0.0, float("nan"))
-    fits = [(*_parts(order, ratios, known), order) for order in np.linspace(*believed, ORDERS)]
+    fits = [(*_parts(order, ratios, products), order) for order in np.linspace(*believed, ORDERS)]
     _, (common, own), order = min(fits, key=lambda fit: fit[0])
     safety = _safety(float(order), believed)
     return MeshError(safety * float(np.sqrt(common + own)), float(np.sqrt(common)), float(order))
@@ -149,7 +149,7 @@ def _safety(order: float, believed: Range) -> float:
     return SAFETY if order < believed[1] else UNCONFIRMED
 
 
-def _parts(order: float, ratios: Sequence[float], known: np.ndarray) -> tuple[float, np.ndarray]:
+def _parts(order: float, ratios: Sequence[float], products: np.ndarray) -> tuple[float, np.ndarray]:
     """Misfit of the three equations of field_error for one order, and their (a² h1^2p, b² h1^2p)."""
     middle, coarse = ratios[0] ** order, (ratios[0] * ratios[1]) ** order
     rows = np.array(
@@ -160,8 +160,8 @@ def _parts(order: float, ratios: Sequence[float], known: np.ndarray) -> tuple[fl
         ]
     )
     # Each equation counts with the accuracy it is known to, which is relative to the two changes it compares.
-    scale = np.array([known[0], known[1], np.sqrt(known[0] * known[1])])
-    parts, misfit = nnls(rows / scale[:, None], known / scale)
+    scale = np.array([products[0], products[1], np.sqrt(products[0] * products[1])])
+    parts, misfit = nnls(rows / scale[:, None], products / scale)
     return float(misfit), parts
 
 

@@ -91,10 +91,10 @@ def cut_surface(
     mass, split = _masses(body, points, triangles, was, piece, section, to)
     carry = _carried(body, rest, parent, was, piece, section, triangles)
     carrier = np.asarray(carry.argmax(axis=1)).ravel()
-    made = Body(rest, mass, springs, np.ascontiguousarray(triangles, dtype=np.uint32), law=body.law)
+    cut_body = Body(rest, mass, springs, np.ascontiguousarray(triangles, dtype=np.uint32), law=body.law)
     surfaces = {f"piece {k}": triangles[piece[triangles[:, 0]] == k] for k in range(piece.max() + 1)}
-    made = made.keeping(Volumes.closed_surfaces(made, surfaces))
-    return Pieces(made, np.where(was >= 0, was, carrier), Growth(carry, split, piece, new))
+    cut_body = cut_body.keeping(Volumes.closed_surfaces(cut_body, surfaces))
+    return Pieces(cut_body, np.where(was >= 0, was, carrier), Growth(carry, split, piece, new))
 
 
 def _pieces(triangles: np.ndarray, count: int) -> np.ndarray:
@@ -105,8 +105,8 @@ def _pieces(triangles: np.ndarray, count: int) -> np.ndarray:
 
 def _section(before: np.ndarray, triangles: np.ndarray, was: np.ndarray) -> np.ndarray:
     """Which triangles are none of those `before` (f, 3), (f',) bool."""
-    known = set(map(tuple, np.sort(before.astype(np.int64), axis=1).tolist()))
-    return np.array([tuple(row) not in known for row in np.sort(was[triangles], axis=1).tolist()])
+    old = set(map(tuple, np.sort(before.astype(np.int64), axis=1).tolist()))
+    return np.array([tuple(row) not in old for row in np.sort(was[triangles], axis=1).tolist()])
 
 
 def _axes(
@@ -123,11 +123,11 @@ def _axes(
     nodes, was, of = [old], [first + np.arange(len(old))], [of_old]
     for k in np.setdiff1d(np.arange(count), of_old):
         used, local = np.unique(surfaces[k], return_inverse=True)
-        made = virtual_nodes(points[used], local.reshape(-1, 3), spacing, axis)
-        made = made[np.unique(closest_virtual_node(points[used], made))]
-        nodes.append(made)
-        was.append(np.full(len(made), NEW))
-        of.append(np.full(len(made), k))
+        axis_nodes = virtual_nodes(points[used], local.reshape(-1, 3), spacing, axis)
+        axis_nodes = axis_nodes[np.unique(closest_virtual_node(points[used], axis_nodes))]
+        nodes.append(axis_nodes)
+        was.append(np.full(len(axis_nodes), NEW))
+        of.append(np.full(len(axis_nodes), k))
     return np.concatenate(nodes), np.concatenate(was), np.concatenate(of)
 
 
@@ -148,17 +148,17 @@ def _springs(
     ends, kind = ends[within], kind[within]
 
     key = _keys(was[ends], kind, n)
-    known = _keys(old.ends.astype(np.int64), old.kind.astype(np.int64), n)
-    order = np.argsort(known)
-    at = order[np.minimum(np.searchsorted(known, key, sorter=order), len(order) - 1)]
-    kept = (known[at] == key) & (was[ends] >= 0).all(axis=1)
+    old_key = _keys(old.ends.astype(np.int64), old.kind.astype(np.int64), n)
+    order = np.argsort(old_key)
+    at = order[np.minimum(np.searchsorted(old_key, key, sorter=order), len(order) - 1)]
+    kept = (old_key[at] == key) & (was[ends] >= 0).all(axis=1)
     copies = np.bincount(at[kept], minlength=old.count)
     of_kind = np.array([_stiffness_of(old, k) for k in groups])
     stiffness, length = of_kind[kind], lengths(rest, ends)
     stiffness[kept] = old.stiffness[at[kept]] / copies[at[kept]]
     length[kept] = old.rest_length[at[kept]]
-    made = Springs(np.ascontiguousarray(ends, dtype=np.uint32), length, stiffness, kind.astype(np.uint8))
-    return made, np.flatnonzero(~kept)
+    springs = Springs(np.ascontiguousarray(ends, dtype=np.uint32), length, stiffness, kind.astype(np.uint8))
+    return springs, np.flatnonzero(~kept)
 
 
 def _keys(ends: np.ndarray, kind: np.ndarray, n: int) -> np.ndarray:
@@ -168,8 +168,8 @@ def _keys(ends: np.ndarray, kind: np.ndarray, n: int) -> np.ndarray:
 
 def _stiffness_of(springs: Springs, kind: SpringKind) -> float:
     """Of all springs of a kind [N/m]; of an axis with a single node that of the edges, which weigh as much."""
-    found = springs.stiffness[springs.kind == kind]
-    return float((found if len(found) else springs.stiffness[springs.kind == SpringKind.STRUCTURAL])[0])
+    stiffness = springs.stiffness[springs.kind == kind]
+    return float((stiffness if len(stiffness) else springs.stiffness[springs.kind == SpringKind.STRUCTURAL])[0])
 
 
 def _masses(
@@ -261,5 +261,5 @@ def harmonic(points: np.ndarray, triangles: np.ndarray, first: int) -> tuple[np.
 def affine(points: np.ndarray, places: np.ndarray) -> np.ndarray:
     """The smallest weights of `points` (p, 3) that add up to 1 and meet each of `places` (q, 3), (q, p)."""
     conditions = np.column_stack([np.ones(len(points)), points - points.mean(axis=0)])
-    wanted = np.column_stack([np.ones(len(places)), places - points.mean(axis=0)])
-    return wanted @ np.linalg.pinv(conditions)
+    right = np.column_stack([np.ones(len(places)), places - points.mean(axis=0)])
+    return right @ np.linalg.pinv(conditions)

@@ -49,15 +49,15 @@ def opened(cells: np.ndarray, faces: np.ndarray, n: int) -> Opening:
     """
     cells, faces = np.asarray(cells, dtype=np.int64), np.asarray(faces, dtype=np.int64)[:, :3]
     of_face = OF_FACE if cells.shape[1] == 4 else OF_QUADRATIC_FACE
-    known, first, second = tetrahedron_faces(cells[:, :4])
-    cut = _places(faces, known.astype(np.int64), second, n)
+    mesh_faces, first, second = tetrahedron_faces(cells[:, :4])
+    cut = _places(faces, mesh_faces.astype(np.int64), second, n)
     split = np.zeros(n, dtype=bool)
     split[cells[first[cut] // 4, :][np.arange(len(cut))[:, None], of_face[first[cut] % 4]]] = True
     joined = second >= 0
     joined[cut] = False
     group, node = _groups(cells, of_face, first[joined], second[joined], split)
     behind = np.zeros(group.max(initial=-1) + 1, dtype=bool)
-    same = _sense(faces) == _sense(known[cut].astype(np.int64))
+    same = _sense(faces) == _sense(mesh_faces[cut].astype(np.int64))
     place = np.where(same, first[cut], second[cut])
     corners = (place // 4)[:, None] * cells.shape[1] + of_face[place % 4]
     behind[group[corners]] = True
@@ -74,9 +74,9 @@ def opened(cells: np.ndarray, faces: np.ndarray, n: int) -> Opening:
     return Opening(np.ascontiguousarray(new, dtype=np.uint32), parent, pairs)
 
 
-def _places(faces: np.ndarray, known: np.ndarray, second: np.ndarray, n: int) -> np.ndarray:
+def _places(faces: np.ndarray, mesh_faces: np.ndarray, second: np.ndarray, n: int) -> np.ndarray:
     """Where the cut faces are among those of the mesh, (f,)."""
-    keys = [(np.sort(rows, axis=1) @ np.array([n * n, n, 1], dtype=np.int64)) for rows in (known, faces)]
+    keys = [(np.sort(rows, axis=1) @ np.array([n * n, n, 1], dtype=np.int64)) for rows in (mesh_faces, faces)]
     order = np.argsort(keys[0])
     at = order[np.minimum(np.searchsorted(keys[0], keys[1], sorter=order), len(order) - 1)]
     lost = int(((keys[0][at] != keys[1]) | (second[at] < 0)).sum())

@@ -56,8 +56,10 @@ def bending_pairs(triangles: np.ndarray) -> np.ndarray:
     pairs = np.sort(opposite[order].reshape(-1, 2), axis=1)
     pairs = np.unique(pairs[pairs[:, 0] != pairs[:, 1]], axis=0)
     structural = unique_edges(triangles, EDGES_OF_TRIANGLE)
-    known = set(map(tuple, structural.tolist()))
-    return np.array([pair for pair in pairs.tolist() if tuple(pair) not in known], dtype=pairs.dtype).reshape(-1, 2)
+    mesh_edges = set(map(tuple, structural.tolist()))
+    return np.array([pair for pair in pairs.tolist() if tuple(pair) not in mesh_edges], dtype=pairs.dtype).reshape(
+        -1, 2
+    )
 
 
 def lengths(points: np.ndarray, ends: np.ndarray) -> np.ndarray:

@@ -101,13 +101,13 @@ class Volumes:
         """
         united, place = _united(self.triangles, triangles)
         rows = _moved(self.share, place[0], len(united))
-        wanted = np.zeros(len(united))
-        wanted[place[1][0]] = place[1][1]
+        right = np.zeros(len(united))
+        right[place[1][0]] = place[1][1]
         start = np.ones(self.count)  # exact for regions and nodes
-        found = lsqr(rows.T, wanted, atol=1e-15, btol=1e-15, iter_lim=10 * self.count + 100, x0=start)[0]
-        if np.abs(rows.T @ found - wanted).max() > DEPENDENT:
+        factors = lsqr(rows.T, right, atol=1e-15, btol=1e-15, iter_lim=10 * self.count + 100, x0=start)[0]
+        if np.abs(rows.T @ factors - right).max() > DEPENDENT:
             raise MassSpringError("the kept volumes do not add up to the whole body; keep one volume per node")
-        return found
+        return factors
 
     def joined(self, other: "Volumes") -> "Volumes":
         """Both kinds together. Raises MassSpringError when a volume of `other` is a sum of the rest."""
@@ -256,9 +256,9 @@ def _moved(share: csr_array, place: tuple[np.ndarray, np.ndarray], size: int) ->
 
 def _refuse_dependent(rows: csr_array, names: tuple[str, ...], row: csr_array, name: str) -> None:
     """Volumes are independent functions of the positions exactly when their rows of shares are."""
-    wanted = row.toarray().ravel()
-    found = lsqr(rows.T, wanted, atol=1e-13, btol=1e-13, iter_lim=10 * rows.shape[0] + 100)[0]  # pyright: ignore[reportOptionalSubscript]
-    if np.linalg.norm(rows.T @ found - wanted) < DEPENDENT * np.linalg.norm(wanted):
-        used = [names[r] for r in np.flatnonzero(np.abs(found) > 0.5 * np.abs(found).max())]
+    right = row.toarray().ravel()
+    factors = lsqr(rows.T, right, atol=1e-13, btol=1e-13, iter_lim=10 * rows.shape[0] + 100)[0]  # pyright: ignore[reportOptionalSubscript]
+    if np.linalg.norm(rows.T @ factors - right) < DEPENDENT * np.linalg.norm(right):
+        used = [names[r] for r in np.flatnonzero(np.abs(factors) > 0.5 * np.abs(factors).max())]
         parts = ", ".join(used[:4]) + (f" and {len(used) - 4} more" if len(used) > 4 else "")
         raise MassSpringError(f"volume '{name}' is redundant: it follows from {parts}; leave one of them out")

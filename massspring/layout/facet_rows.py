@@ -48,6 +48,6 @@ def facet_rows(facets: np.ndarray, rest: np.ndarray, inverse_mass: np.ndarray) -
         candidate=np.zeros(points, dtype=np.int64),
         gap=np.zeros(points),
         pressed=np.zeros(len(node), dtype=bool),
-        **{name: np.zeros((*points, 3)) for name in ("slope", "start", "known")},
+        **{name: np.zeros((*points, 3)) for name in ("slope", "start", "last_force")},
         **{name: np.zeros((len(weight), 3)) for name in ("point_speed", "change")},
     )

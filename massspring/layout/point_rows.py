@@ -66,9 +66,9 @@ def _in_blocks(table: np.ndarray) -> np.ndarray:
     blocks = -(-count // BLOCK)
     filled = np.full((blocks * BLOCK, width), table[:1], dtype=table.dtype)
     filled[:count] = table
-    found = aligned((blocks * width, BLOCK), table.dtype)
-    found[:] = filled.reshape(blocks, BLOCK, width).transpose(0, 2, 1).reshape(-1, BLOCK)
-    return found
+    rows = aligned((blocks * width, BLOCK), table.dtype)
+    rows[:] = filled.reshape(blocks, BLOCK, width).transpose(0, 2, 1).reshape(-1, BLOCK)
+    return rows
 
 
 def _entries(table: np.ndarray, count: int, components: int) -> tuple[np.ndarray, np.ndarray]:
@@ -92,6 +92,6 @@ def inverse_at_rest(schur: csr_array | np.ndarray) -> tuple[np.ndarray, np.ndarr
     able = diagonal > 0.0
     scale = np.where(able, 1.0 / np.sqrt(np.where(able, diagonal, 1.0)), 0.0)
     inverse = np.linalg.inv(scale[:, None] * whole * scale + np.diag(np.where(able, SHIFT, 1.0)))
-    found = aligned(inverse.shape, np.dtype(np.float32))
-    found[:] = 0.5 * (inverse + inverse.T)
-    return diagonal, scale, found
+    symmetric = aligned(inverse.shape, np.dtype(np.float32))
+    symmetric[:] = 0.5 * (inverse + inverse.T)
+    return diagonal, scale, symmetric

@@ -49,7 +49,7 @@ def new_probing(body: Body, surface: np.ndarray, probes: tuple[Probe, ...], diag
         near=np.zeros((count, triangles), dtype=np.uint32),
         near_count=np.zeros(count, dtype=np.int64),
         time=np.zeros(triangles),
-        found=np.zeros((triangles, 6)),
+        passing=np.zeros((triangles, 6)),
         rows=rows,
         **{name: np.zeros((nodes, 3)) for name in ("base", "push", "velocity")},
         change=np.zeros(kept),

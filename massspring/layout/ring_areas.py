@@ -47,9 +47,9 @@ def _followers(row: np.ndarray, tail: np.ndarray, head: np.ndarray, share: np.nd
     leaving, arriving = row * nodes + tail, row * nodes + head
     by_tail = np.argsort(leaving, kind="stable")
     place = np.searchsorted(leaving[by_tail], arriving) + _rank(arriving)
-    found = by_tail[np.minimum(place, len(by_tail) - 1)] if len(by_tail) else by_tail
-    follows = (place < len(by_tail)) & (leaving[found] == arriving) & (share[found] == share)
-    return np.where(follows, found, -1)
+    follower = by_tail[np.minimum(place, len(by_tail) - 1)] if len(by_tail) else by_tail
+    follows = (place < len(by_tail)) & (leaving[follower] == arriving) & (share[follower] == share)
+    return np.where(follows, follower, -1)
 
 
 def _rank(key: np.ndarray) -> np.ndarray:

@@ -72,12 +72,12 @@ def _lists_of(springs: Springs, triangles: np.ndarray, nodes: int) -> tuple[np.n
     centre, walk, place, neighbour = rings(triangles, nodes)
     spring, other = np.full(len(walk), -1), np.ones(len(here), dtype=bool)
     if springs.count:
-        known, first = np.unique(here * nodes + there, return_index=True)
-        wanted = centre[walk] * nodes + neighbour
-        found = np.minimum(np.searchsorted(known, wanted), len(known) - 1)
-        joined = known[found] == wanted
-        spring[joined] = number[first[found[joined]]]
-        other[first[found[joined]]] = False
+        keys, first = np.unique(here * nodes + there, return_index=True)
+        key = centre[walk] * nodes + neighbour
+        index = np.minimum(np.searchsorted(keys, key), len(keys) - 1)
+        joined = keys[index] == key
+        spring[joined] = number[first[index[joined]]]
+        other[first[index[joined]]] = False
     order = np.flatnonzero(other)[np.argsort(here[other], kind="stable")]
     owner = here[order]
     at = np.arange(len(owner)) - np.searchsorted(owner, owner)
@@ -140,8 +140,8 @@ def _rows(lists: _Lists, slices: int) -> np.ndarray:
 def _by_node(node: np.ndarray, piece: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """The nodes, ascending, the pieces node by node, and where those of each node begin."""
     order = np.argsort(node, kind="stable")
-    found, start = np.unique(node[order], return_index=True)
-    return found, piece[order], np.r_[start, len(node)].astype(np.int64)
+    owners, start = np.unique(node[order], return_index=True)
+    return owners, piece[order], np.r_[start, len(node)].astype(np.int64)
 
 
 def places_in_slices(springs: Springs, triangles: np.ndarray, rest: np.ndarray) -> np.ndarray:

@@ -22,7 +22,7 @@ from massspring.kernels.arrays.layout import BoundaryConditions
 from massspring.layout.allocate import start
 from massspring.layout.state import State
 from massspring.methods.capabilities import Capabilities
-from massspring.methods.families.known_pressure import check_modulus
+from massspring.methods.families.pressure_law import check_modulus
 from massspring.methods.families.tetrahedra import cell_stiffness, cells_of, push_cells
 from massspring.methods.method import Method
 from massspring.world.obstacles import Attachment

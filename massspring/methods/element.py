@@ -27,7 +27,7 @@ from massspring.kernels.step.end import end_step
 from massspring.layout.allocate import start
 from massspring.layout.state import State
 from massspring.methods.capabilities import Capabilities, No
-from massspring.methods.families.known_pressure import check_modulus
+from massspring.methods.families.pressure_law import check_modulus
 from massspring.methods.families.tetrahedra import cell_stiffness, cells_of, own_cells, push_cells
 from massspring.methods.method import Method, begin_frame
 from massspring.world.obstacles import Attachment

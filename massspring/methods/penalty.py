@@ -16,7 +16,7 @@ from massspring.body.body import Body
 from massspring.kernels.arrays.layout import BoundaryConditions
 from massspring.layout.state import State
 from massspring.methods.capabilities import Capabilities
-from massspring.methods.families.known_pressure import PENALTY, check_modulus, push, volume_stiffness
+from massspring.methods.families.pressure_law import PENALTY, check_modulus, push, volume_stiffness
 from massspring.methods.method import Method
 
 

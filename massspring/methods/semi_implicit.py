@@ -69,13 +69,13 @@ class Prepared:
 
     jacobian: csr_array
     """J at rest [m²], (m, 3n)."""
-    known: dict[tuple[float, float], tuple[SpringFactor, Any]]
+    factors: dict[tuple[float, float], tuple[SpringFactor, Any]]
 
     def at(self, model: Model, rows: PointRows, dt: float, damping: float) -> tuple[SpringFactor, PointRows]:
         """The factor for steps of `dt` [s] with `damping` [1/s], and the rows with S⁻¹ of that response."""
-        if (dt, damping) not in self.known:
-            self.known[dt, damping] = _factored(self.jacobian, model, dt, damping)
-        implicit, (diagonal, scale, inverse) = self.known[dt, damping]
+        if (dt, damping) not in self.factors:
+            self.factors[dt, damping] = _factored(self.jacobian, model, dt, damping)
+        implicit, (diagonal, scale, inverse) = self.factors[dt, damping]
         return implicit, rows._replace(diagonal=diagonal, scale=scale, inverse=inverse)
 
 

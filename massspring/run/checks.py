@@ -62,8 +62,8 @@ def check_targets(targets: Mapping[str, Ramp], body: Body, method: Method) -> No
         )
     for name, ramp in targets.items():
         if name not in body.kept.names:
-            known = ", ".join(body.kept.names[:6])
-            raise MassSpringError(f"target '{name}' names no kept volume; the body keeps {known}")
+            names = ", ".join(body.kept.names[:6])
+            raise MassSpringError(f"target '{name}' names no kept volume; the body keeps {names}")
         if min(ramp.values) <= 0:
             raise MassSpringError(f"target '{name}' falls to {min(ramp.values):g} of its rest volume; keep it positive")
 

@@ -79,9 +79,9 @@ class LettingIn:
 
     def lengths(self, rest_length: np.ndarray, t: float) -> np.ndarray:
         """The rest lengths of all springs at time t [s], in the end `rest_length` (s,) [m]."""
-        found, share = rest_length.copy(), 1.0 if self.done(t) else (t - self.at) / self.time
-        found[self.springs] = self.begin + share * (rest_length[self.springs] - self.begin)
-        return found
+        lengths, share = rest_length.copy(), 1.0 if self.done(t) else (t - self.at) / self.time
+        lengths[self.springs] = self.begin + share * (rest_length[self.springs] - self.begin)
+        return lengths
 
 
 def kept_momentum(v: np.ndarray, x: np.ndarray, mass: np.ndarray, growth: Growth) -> np.ndarray:
@@ -128,13 +128,13 @@ def check_event(event: Event, before: Body) -> None:
             f"the volumes {event.ended} that end at an event are not among the {before.kept.count} before it, or one "
             "is given twice"
         )
-    for what, rows, count, known in (
+    for what, rows, count, numbers in (
         ("nodes", parent, event.body.node_count, np.arange(before.node_count)),
         ("kept volumes", volumes, event.body.kept.count, kept),
     ):
-        if rows.shape != (count,) or not np.array_equal(np.unique(rows), known):
+        if rows.shape != (count,) or not np.array_equal(np.unique(rows), numbers):
             raise MassSpringError(
-                f"the {count} {what} after an event do not name all {len(known)} before it; give each its parent"
+                f"the {count} {what} after an event do not name all {len(numbers)} before it; give each its parent"
             )
     grown = event.growth
     old = np.ones(len(parent), dtype=bool) if grown is None else grown.mass > 0.0

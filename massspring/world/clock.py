@@ -39,17 +39,17 @@ def make_clock(duration: float, frames: int, dt: float | str, limit: StepLimit, 
     if isinstance(dt, str):
         if dt != "auto":
             raise MassSpringError(f"dt is '{dt}'; give seconds or 'auto'")
-        wanted = AUTO_FRACTION * limit.damped
+        longest = AUTO_FRACTION * limit.damped
     else:
-        wanted = float(dt)
-    if not (math.isfinite(wanted) and wanted > 0):
+        longest = float(dt)
+    if not (math.isfinite(longest) and longest > 0):
         raise MassSpringError(f"dt is {dt} s; it must be positive, the stability limit is {limit.damped:.3g} s")
     if frames < 1 or not duration > 0:
         raise MassSpringError(
             f"{frames} frames in {duration} s; a run needs at least one frame and a positive duration"
         )
     frame = duration / frames
-    clock = Clock(frame, frames, max(1, math.ceil(frame / wanted - 1e-9)))
+    clock = Clock(frame, frames, max(1, math.ceil(frame / longest - 1e-9)))
     if clock.dt > limit.damped and not beyond_limit:
         raise MassSpringError(
             f"dt = {clock.dt:.3g} s lies above the stability limit of {limit.damped:.3g} s; "

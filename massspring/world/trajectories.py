@@ -34,10 +34,10 @@ class Trajectory:
     def __call__(self, t: float | np.ndarray) -> np.ndarray:
         """Displacement [m] at time(s) `t` [s], (3,) or (q, 3)."""
         times, columns = self._keys
-        found = np.empty((*np.shape(t), 3))
+        displacement = np.empty((*np.shape(t), 3))
         for axis in range(3):
-            found[..., axis] = np.interp(t, times, columns[axis])
-        return found
+            displacement[..., axis] = np.interp(t, times, columns[axis])
+        return displacement
 
     @cached_property
     def _keys(self) -> tuple[np.ndarray, np.ndarray]:

@@ -195,15 +195,15 @@ def first_grip(rows: np.ndarray, sticks: np.ndarray, surface: Surface, x: np.nda
     return Grip(stuck, y - rows[:, None, None, 1:4], np.zeros((*shape, 3)))
 
 
-def renewed_grip(found: Touch, sticks: np.ndarray, surface: Surface, x: np.ndarray) -> Grip:
+def renewed_grip(touch: Touch, sticks: np.ndarray, surface: Surface, x: np.ndarray) -> Grip:
     """The grip after a load step: what is pressed stays stuck where it was, or sticks where it is now."""
-    old = found.grip
+    old = touch.grip
     if not sticks.any():
         return old
-    stuck = sticks[:, None, None] & (found.pressure > 0.0)
-    here = point_positions(x, surface) - found.rows[:, None, None, 1:4]
+    stuck = sticks[:, None, None] & (touch.pressure > 0.0)
+    here = point_positions(x, surface) - touch.rows[:, None, None, 1:4]
     kept = (stuck & old.stuck)[..., None]
-    return Grip(stuck, np.where(kept, old.anchor, here), np.where(kept, found.traction, 0.0))
+    return Grip(stuck, np.where(kept, old.anchor, here), np.where(kept, touch.traction, 0.0))
 
 
 def potential(x: np.ndarray, surface: Surface, touch: Touch):

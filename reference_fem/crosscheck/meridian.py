@@ -65,9 +65,9 @@ class MeridianSolution:
         """(n, 3) [m] at rest points (n, 3) [m] of the ball, about its centre: the equator moves in its plane only."""
         r, z = np.hypot(points[:, 0], points[:, 1]), np.abs(points[:, 2])
         inward = 1.0 - 1e-6  # the curved mesh may end that much inside the sphere
-        found = np.array([self.u(self.mesh(a * inward, b * inward)) for a, b in zip(r, z, strict=True)])
+        moves = np.array([self.u(self.mesh(a * inward, b * inward)) for a, b in zip(r, z, strict=True)])
         outward = points[:, :2] / np.where(r > 0, r, 1.0)[:, None]
-        return np.column_stack((outward * found[:, :1], np.sign(points[:, 2]) * found[:, 1]))
+        return np.column_stack((outward * moves[:, :1], np.sign(points[:, 2]) * moves[:, 1]))
 
 
 def quarter(radius: float, edge_at: float, mesh: MeridianMesh) -> Any:
@@ -87,14 +87,14 @@ def quarter(radius: float, edge_at: float, mesh: MeridianMesh) -> Any:
     geometry.Append(["spline3", east, arc(0.0, angle), edge], bc="side")
     geometry.Append(["spline3", edge, arc(angle, 0.5 * np.pi), pole], bc="top")
     geometry.Append(["line", pole, centre], bc="axis")
-    found = load("ngsolve").Mesh(geometry.GenerateMesh(maxh=mesh.size * radius))
+    disc = load("ngsolve").Mesh(geometry.GenerateMesh(maxh=mesh.size * radius))
     for _ in range(mesh.halvings):
-        for element in found.Elements():
-            near = [np.hypot(*np.subtract(found[v].point, outline)) < AT * radius for v in element.vertices]
-            found.SetRefinementFlag(element, any(near))
-        found.Refine()
-    found.Curve(ORDER + 1)
-    return found
+        for element in disc.Elements():
+            near = [np.hypot(*np.subtract(disc[v].point, outline)) < AT * radius for v in element.vertices]
+            disc.SetRefinementFlag(element, any(near))
+        disc.Refine()
+    disc.Curve(ORDER + 1)
+    return disc
 
 
 class Quarter:

@@ -136,7 +136,7 @@ class NgsolveModel:
         middles = ends[:, mesh.edges].mean(axis=1) + bulge
         return np.hstack((ends, middles)).T, vector[3 * len(nodes(mesh)) :].copy()
 
-    def wanted(self, t: float):
+    def increments(self, t: float):
         """Increments of the held unknowns that lead to time t, as NGSolve's coefficients, zero elsewhere."""
         mesh = self.problem.mesh
         u, _ = self.fields(self.vector())
@@ -157,7 +157,7 @@ class NgsolveModel:
         """To time t in one step: the prescribed increment through the tangent, then Newton; returns its iterations."""
         form, vec = self.form, self.state.vec
         step = vec.CreateVector()
-        step.FV().NumPy()[:] = self.wanted(t)
+        step.FV().NumPy()[:] = self.increments(t)
         form.AssembleLinearization(vec)
         pulled = (form.mat * step).Evaluate()
         vec.data += step - form.mat.Inverse(self.free, inverse=inverse) * pulled

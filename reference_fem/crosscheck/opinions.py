@@ -25,8 +25,8 @@ def opinion(problem: Problem, what: str) -> tuple[Check, ...]:
     ours, theirs = equilibrium_path(problem, STEPS, CLOSE)[-1], solve(problem, STEPS)
     place = f"{what}, {problem.mesh.nelements:,} straight elements, order {problem.degree} in both"
     count = unknowns(problem)
-    force, our_force = (float(np.linalg.norm(found.held_force[0])) for found in (theirs, ours))
-    size, our_size = (float(np.sqrt(np.mean(found.u**2))) for found in (theirs, ours))
+    force, our_force = (float(np.linalg.norm(solution.held_force[0])) for solution in (theirs, ours))
+    size, our_size = (float(np.sqrt(np.mean(solution.u**2))) for solution in (theirs, ours))
     apart = float(np.abs(theirs.u - ours.u).max() / np.abs(theirs.u).max())
     pressure = float(np.abs(theirs.p - ours.p).max() / np.abs(theirs.p).max())
     return (

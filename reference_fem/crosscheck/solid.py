@@ -56,20 +56,20 @@ class SolidSolution:
         among: the elements that are searched, (ne,) bool: a place on a cut is in those on both sides of it.
         """
         chosen = np.arange(self.problem.mesh.nelements) if among is None else np.flatnonzero(among)
-        found, local = self._evaluator(chosen).locate(points)
-        return self._at(chosen[found], local)
+        index, local = self._evaluator(chosen).locate(points)
+        return self._at(chosen[index], local)
 
     def _at(self, elements: np.ndarray, local: np.ndarray) -> np.ndarray:
         ng = load("ngsolve")
-        found = np.empty((len(elements), 3))
+        moves = np.empty((len(elements), 3))
         for k, (element, place) in enumerate(zip(elements, local, strict=True)):
             corners = self.problem.mesh.t[:4, element].tolist()
             weights = dict(zip(corners, (1.0 - place.sum(), *place), strict=True))
             number = ng.ElementId(ng.VOL, int(element))
             theirs = [weights[vertex.nr] for vertex in self.mesh[number].vertices]
             element_map = self.mesh.GetTrafo(number)  # must live as long as the point
-            found[k] = self.u(element_map(*theirs[:3]))
-        return found
+            moves[k] = self.u(element_map(*theirs[:3]))
+        return moves
 
     def _evaluator(self, chosen: np.ndarray) -> Evaluator:
         """Of the chosen elements, numbered as they are chosen."""
@@ -95,7 +95,7 @@ def boundaries(problem: Problem) -> dict[str, np.ndarray]:
     Raises SolveError for a region without a facet.
     """
     table, x = facet_nodes(problem.mesh), nodes(problem.mesh)
-    surface, rest, found = np.unique(table), np.ones(len(table), dtype=bool), {}
+    surface, rest, facets = np.unique(table), np.ones(len(table), dtype=bool), {}
     for number, held in enumerate(problem.held):
         inside = np.zeros(len(x), dtype=bool)
         inside[surface] = held.where(x[surface].T)
@@ -104,8 +104,8 @@ def boundaries(problem: Problem) -> dict[str, np.ndarray]:
             raise SolveError(
                 f"held region {number} contains no whole boundary facet: choose a larger one, or finer mesh"
             )
-        found[f"held{number}"], rest = table[whole, :3], rest & ~whole
-    return found | {FREE: table[rest, :3]}
+        facets[f"held{number}"], rest = table[whole, :3], rest & ~whole
+    return facets | {FREE: table[rest, :3]}
 
 
 def curved_body(mesh: MeshTet, facets: dict[str, np.ndarray]) -> tuple[Any, Any]:

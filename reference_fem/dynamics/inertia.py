@@ -111,25 +111,25 @@ class MovingSystem(System):
 
     def evaluate(self, x: np.ndarray, loads: Loads, tangent: bool = True) -> Evaluation:
         """As at rest, with inertia, once there is a clock."""
-        found = super().evaluate(x, loads, tangent)
+        evaluation = super().evaluate(x, loads, tangent)
         if self.clock is None:
-            return found
+            return evaluation
         n, count = self.displacement_count, len(self.pattern.indices)
         v, a, _ = self.clock.at(x[:n])
         inertia = self.inertia(a + self.damping * v)
-        found.residual[:n] += inertia
+        evaluation.residual[:n] += inertia
         if tangent:
             by_v, by_a = self.clock.slopes()
             # not the columns of prescribed unknowns: their acceleration is given
-            found.values[:count] += (by_a + self.damping * by_v) * self.mass.values[:count]
-        found.errors[0] = self.force_error(found, inertia, v, loads.force)
-        return found
+            evaluation.values[:count] += (by_a + self.damping * by_v) * self.mass.values[:count]
+        evaluation.errors[0] = self.force_error(evaluation, inertia, v, loads.force)
+        return evaluation
 
     def inertia(self, field: np.ndarray):
         """Mass times a nodal field, interleaved (3 N2,)."""
         return self.mass.times(field.reshape(-1, 3)).ravel()
 
-    def force_error(self, found: Evaluation, inertia: np.ndarray, v: np.ndarray, force: np.ndarray | float):
+    def force_error(self, evaluation: Evaluation, inertia: np.ndarray, v: np.ndarray, force: np.ndarray | float):
         """Unbalanced force over the forces at work.
 
         Where nothing acts, as in free flight, the scale is the force of elasticity that would stop the motion.
@@ -137,7 +137,7 @@ class MovingSystem(System):
         free = self.pattern.free[self.pattern.free < self.displacement_count]
         mu, size = self.problem.material.mu, self.volume ** (1.0 / 3.0)
         stop = np.linalg.norm(self.inertia(v)) * np.sqrt(mu / self.problem.density) / size
-        held = np.linalg.norm(found.residual[self.pattern.held])
-        pushed = np.abs(found.touch.force).sum()
+        held = np.linalg.norm(evaluation.residual[self.pattern.held])
+        pushed = np.abs(evaluation.touch.force).sum()
         sizes = (held, pushed, np.linalg.norm(force), np.linalg.norm(inertia), stop, 1e-9 * mu * size**2)
-        return np.linalg.norm(found.residual[free]) / max(sizes)
+        return np.linalg.norm(evaluation.residual[free]) / max(sizes)

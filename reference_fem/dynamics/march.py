@@ -47,12 +47,12 @@ class Account:
         """Forces, pressures and dissipation of a motion."""
         system, state = self.system, motion.state
         loads = system.loads_of(state)
-        found = system.evaluate(state.x, loads, tangent=False)
+        evaluation = system.evaluate(state.x, loads, tangent=False)
         dissipation = 2.0 * system.damping * kinetic(system, motion)
         rows = loads.rows[:, 1:4]
-        reaction, pressures = found.residual[system.pattern.held], state.x[system.field_count :]
-        push = found.touch.force
-        return Powers(np.asarray(loads.force), rows, push, reaction, pressures, found.volumes, dissipation)
+        reaction, pressures = evaluation.residual[system.pattern.held], state.x[system.field_count :]
+        push = evaluation.touch.force
+        return Powers(np.asarray(loads.force), rows, push, reaction, pressures, evaluation.volumes, dissipation)
 
     def book(self, old: Motion, new: Motion):
         """The step from old to new."""

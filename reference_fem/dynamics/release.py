@@ -37,15 +37,15 @@ def released(system: MovingSystem, state: State, v: np.ndarray, dt: float) -> Mo
     for k, lumen in enumerate(system.lumens):
         if lumen.by_pressure:
             x[system.field_count + k] = loads.filling[k]
-    found = system.evaluate(x, loads)
-    found.residual[:n] += system.damping * system.inertia(v)
-    found.residual[n:] = 0.0
+    evaluation = system.evaluate(x, loads)
+    evaluation.residual[:n] += system.damping * system.inertia(v)
+    evaluation.residual[n:] = 0.0
     for sign in (1.0, -1.0):
         y = x.copy()
         y[:n] += sign * dt * v
-        found.residual[n:] += system.evaluate(y, loads, tangent=False).residual[n:] / dt**2
-    put_mass(system, found.values, dt)
-    solution = Tangent(system, found).newton(held_a)
+        evaluation.residual[n:] += system.evaluate(y, loads, tangent=False).residual[n:] / dt**2
+    put_mass(system, evaluation.values, dt)
+    solution = Tangent(system, evaluation).newton(held_a)
     x[n:] += solution[n:]
     return Motion(
         replace(state, load=1.0, x=x),

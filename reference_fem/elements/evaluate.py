@@ -53,9 +53,9 @@ class Evaluator:
             )
         return element, local
 
-    def improve(self, points: np.ndarray, open_: np.ndarray, count: int, found: tuple[np.ndarray, np.ndarray]):
+    def improve(self, points: np.ndarray, open_: np.ndarray, count: int, places: tuple[np.ndarray, np.ndarray]):
         """Try the `count` elements with the nearest centroids for the open points, keep the closest of each."""
-        element, local = found
+        element, local = places
         count = min(count, len(self.table))
         _, near = self.tree.query(points[open_], k=count)
         for candidate in near.reshape(len(open_), count).T:
@@ -74,10 +74,10 @@ class Evaluator:
         edges = (corners[:, 1:] - corners[:, :1]).transpose(0, 2, 1)
         local = np.linalg.solve(edges, (points - corners[:, 0])[:, :, None])[:, :, 0]
         near = np.flatnonzero((np.abs(local - 0.5) <= 1.5).all(axis=1))
-        reach, x, wanted = local[near], self.x[self.table[element[near]]], points[near]
+        reach, x, target = local[near], self.x[self.table[element[near]]], points[near]
         for _ in range(8):
             values, gradients = basis_table(ElementTetP2(), reach.T)
-            gap = wanted - np.einsum("ma,mai->mi", values, x)
+            gap = target - np.einsum("ma,mai->mi", values, x)
             slope = np.einsum("mai,mJa->miJ", x, gradients)
             move = np.linalg.solve(slope, gap[:, :, None])[:, :, 0]
             reach = np.clip(reach + move, -1.0, 2.0)

@@ -202,8 +202,8 @@ def edge_index(mesh: MeshTet, pairs: np.ndarray):
     edges = np.asarray(mesh.edges)
     keys = np.min(edges, axis=0) * np.int64(count) + np.max(edges, axis=0)
     order = np.argsort(keys)
-    wanted = np.min(pairs, axis=1) * np.int64(count) + np.max(pairs, axis=1)
-    return order[np.searchsorted(keys, wanted, sorter=order)]
+    pair_keys = np.min(pairs, axis=1) * np.int64(count) + np.max(pairs, axis=1)
+    return order[np.searchsorted(keys, pair_keys, sorter=order)]
 
 
 def build_facets(mesh: MeshTet, order: int, element: Element = ELEMENTS[DEFAULT]) -> Facets:

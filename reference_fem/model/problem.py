@@ -87,7 +87,7 @@ def find_held(problem: Problem) -> list[HeldNodes]:
     element = find_element(problem.element)
     x = displacement_points(problem.mesh, element)
     boundary = np.unique(build_facets(problem.mesh, problem.contact_order, element).nodes)
-    found = []
+    regions = []
     for k, held in enumerate(problem.held):
         components = tuple(held.components)
         if not components or not set(components) <= {0, 1, 2}:
@@ -101,5 +101,5 @@ def find_held(problem: Problem) -> list[HeldNodes]:
             )
         factors = np.ones((3, chosen.size)) if held.shape is None else np.asarray(held.shape(x[chosen].T), dtype=float)
         dofs = np.stack([3 * chosen + c for c in components])
-        found.append(HeldNodes(chosen, dofs, components, factors[list(components)], held.motion))
-    return found
+        regions.append(HeldNodes(chosen, dofs, components, factors[list(components)], held.motion))
+    return regions

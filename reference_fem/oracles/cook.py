@@ -58,13 +58,13 @@ def bend(cells: int):
 
 def measure() -> Outcome:
     """Three displacements on the finest mesh, the corner's error over mesh size."""
-    found = [bend(cells) for cells in FAMILY]
-    problem, last = found[-1]
+    bends = [bend(cells) for cells in FAMILY]
+    problem, last = bends[-1]
     mesh = f"slab, {FAMILY[-1]} x {FAMILY[-1]} cells, graded"
     checks = [
         Check(f"{what}", "mm", truth, last[what], 5e-3, mesh, unknowns(problem)) for what, truth in exact.COOK.items()
     ]
-    errors = tuple(abs(got["corner u_y"] / exact.COOK["corner u_y"] - 1.0) for _, got in found)
+    errors = tuple(abs(values["corner u_y"] / exact.COOK["corner u_y"] - 1.0) for _, values in bends)
     sizes = tuple(1.0 / cells for cells in FAMILY)
     curve = Curve("oracles: error of the main quantity", "Cook's membrane, corner u_y", sizes, errors)
     return Outcome(tuple(checks), (curve,))

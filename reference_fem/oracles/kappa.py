@@ -38,9 +38,9 @@ def dependence() -> dict[str, np.ndarray]:
 
 def measure() -> Outcome:
     """The order of approach, and what is left at the largest ratio."""
-    found = {ratio: sphere_pressure(ratio) for ratio in RATIOS}
-    problem, last = found[RATIOS[-1]]
-    change = [abs(found[ratio][1] / last - 1.0) for ratio in (1e2, 1e3)]
+    spheres = {ratio: sphere_pressure(ratio) for ratio in RATIOS}
+    problem, last = spheres[RATIOS[-1]]
+    change = [abs(spheres[ratio][1] / last - 1.0) for ratio in (1e2, 1e3)]
     about = (f"octant, {SHELL[0]} columns x {SHELL[1]} layers", unknowns(problem))
     # second order in mu/kappa: a few hundredths at 1e2
     order = Check(

@@ -120,7 +120,7 @@ def curves(name: str) -> tuple[Curve, Curve]:
 
 def orders(names: Iterable[str]) -> Outcome:
     """Orders of some elements between their two finest meshes."""
-    checks, found = [], []
+    checks, error_curves = [], []
     for name in names:
         problem = build(name, CELLS[name][-1])
         about = (f"cube, {problem.mesh.nelements} {name}", unknowns(problem))
@@ -130,8 +130,8 @@ def orders(names: Iterable[str]) -> Outcome:
             kind = "within" if name == DEFAULT else "at least"
             quantity = f"order of the error of {what}, {name}"
             checks.append(Check(quantity, "1", rate, curve.order, 0.15, *about, absolute=True, kind=kind))
-        found += pair
-    return Outcome(tuple(checks), tuple(found))
+        error_curves += pair
+    return Outcome(tuple(checks), tuple(error_curves))
 
 
 def others() -> Outcome:

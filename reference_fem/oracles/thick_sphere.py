@@ -39,9 +39,9 @@ def measure() -> Outcome:
                 sizes.append(1.0 / columns)
                 errors.append(abs(pressures[-1] / expected[-1] - 1.0))
         mesh = f"octant, {columns} columns x {layers} layers"
-        for stretch, truth, got in zip(STRETCHES, expected, pressures, strict=True):
+        for stretch, truth, pressure in zip(STRETCHES, expected, pressures, strict=True):
             quantity = f"lumen pressure, B/A {1.0 / inner:g}, stretch {stretch:g}"
-            checks.append(Check(quantity, "mu", truth, got, 1e-3, mesh, unknowns(problem)))
+            checks.append(Check(quantity, "mu", truth, pressure, 1e-3, mesh, unknowns(problem)))
     curve = Curve("oracles: error of the main quantity", "thick sphere, pressure", tuple(sizes), tuple(errors))
     return Outcome(tuple(checks), (curve,))
 

@@ -31,12 +31,12 @@ def measure() -> Outcome:
             problem, state = pull(material, stretch, mesh)
             at = f"{law}, stretch {stretch:g}"
             side = exact.uniaxial_lateral_stretch(material, stretch)
-            for what, unit, expected, got in (
+            for what, unit, expected, value in (
                 ("force", "mu m²", exact.uniaxial_stress(material, stretch), state.held_force[3, 2]),
                 ("V/V0", "1", stretch * side**2, state.volume),
             ):
                 mesh_name = f"block, {mesh.nelements} P2/P1"
-                checks.append(Check(f"{what}, {at}", unit, expected, float(got), 1e-8, mesh_name, unknowns(problem)))
+                checks.append(Check(f"{what}, {at}", unit, expected, float(value), 1e-8, mesh_name, unknowns(problem)))
     return Outcome(tuple(checks))
 
 

@@ -118,17 +118,17 @@ class Influence:
     def __init__(self, system: System, tangent: Tangent, points: Points):
         self.tangent, self.points = tangent, points
         self.pushes = points.directions[:, system.pattern.free]
-        self.known: dict[int, np.ndarray] = {}
+        self.columns: dict[int, np.ndarray] = {}
 
     def of(self, chosen: np.ndarray):
         """Movement of all points off their obstacles per force [m/N], (np, len(chosen))."""
-        new = [k for k in chosen if k not in self.known]
+        new = [k for k in chosen if k not in self.columns]
         for first in range(0, len(new), BATCH):
             batch = new[first : first + BATCH]
             pushes = self.pushes[batch].T.toarray(order="F")
             moves = self.points.directions @ self.tangent.respond(pushes, checked=False)
-            self.known |= dict(zip(batch, moves.T, strict=True))
-        return np.array([self.known[k] for k in chosen]).reshape(len(chosen), len(self.points.gap)).T
+            self.columns |= dict(zip(batch, moves.T, strict=True))
+        return np.array([self.columns[k] for k in chosen]).reshape(len(chosen), len(self.points.gap)).T
 
     def forces(self, push: np.ndarray):
         """Forces on the free unknowns of pushes (np,) [N] at the points."""
@@ -141,7 +141,7 @@ def settled(system: System, tangent: Tangent, x: np.ndarray, change: np.ndarray)
 
     The next tangent counts with those: they tell better than the gaps which points are going to touch.
     """
-    touch, faces = tangent.found.touch, tangent.found.faces
+    touch, faces = tangent.evaluation.touch, tangent.evaluation.faces
     parts = points_near(system, touch, x, change), points_between(system, faces, x, change)
     points = together(*parts)
     influence = Influence(system, tangent, points)
@@ -149,13 +149,13 @@ def settled(system: System, tangent: Tangent, x: np.ndarray, change: np.ndarray)
     plain = gap = points.gap + points.directions @ change
     push = np.zeros(len(gap))
     for _ in range(ROUNDS):
-        wanted = changed(points, gap)
-        if len(set(wanted) | influence.known.keys()) > MOST:
+        chosen = changed(points, gap)
+        if len(set(chosen) | influence.columns.keys()) > MOST:
             break
-        goal, moves = np.zeros(len(gap)), influence.of(wanted)
-        goal[wanted] = pushes(points, wanted, moves[wanted], plain)
-        there = plain + moves @ goal[wanted]
-        if np.array_equal(wanted, changed(points, there)):
+        goal, moves = np.zeros(len(gap)), influence.of(chosen)
+        goal[chosen] = pushes(points, chosen, moves[chosen], plain)
+        there = plain + moves @ goal[chosen]
+        if np.array_equal(chosen, changed(points, there)):
             push, gap = goal, there
             break
         share = share_of(points, push, goal - push, gap, there - gap)

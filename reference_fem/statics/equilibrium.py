@@ -143,8 +143,8 @@ def stuck(state: State, t: float, failure: Exception, path: Sequence[Equilibrium
 def describe(system: System, state: State, iterations: int, substeps: int) -> Equilibrium:
     """Everything worth knowing about a converged state."""
     n, elements = system.displacement_count, system.elements
-    found = system.evaluate(state.x, system.loads_of(state), tangent=False)
-    slip = farthest_slip(state.x, system.faces, found.faces)
+    evaluation = system.evaluate(state.x, system.loads_of(state), tangent=False)
+    slip = farthest_slip(state.x, system.faces, evaluation.faces)
     if slip > 1.0:
         raise SolveError(
             f"faces of the cut that touch have slid over each other by {slip:.2g} facets at t = {state.t:g} s, and"
@@ -153,27 +153,27 @@ def describe(system: System, state: State, iterations: int, substeps: int) -> Eq
     mesh, material = system.problem.mesh, system.problem.material
     J = np.linalg.det(assembly.deformation(state.x, elements, material.kappa)[0])
     reaction, held = np.zeros(n), system.pattern.held
-    reaction[held] = found.residual[held]
+    reaction[held] = evaluation.residual[held]
     for lumen, pressure in zip(system.lumens, state.x[system.field_count :], strict=True):
         reaction[held] += pressure * lumen.beyond_pressure(state.x[: system.field_count])[held]
     return Equilibrium(
         t=float(state.t),
         u=at_nodes(mesh, system.element, state.x[:n].reshape(-1, 3).copy()),
         p=assembly.vertex_pressure(state.x[: system.field_count], elements, mesh, material.kappa),
-        obstacle_force=found.touch.force,
+        obstacle_force=evaluation.touch.force,
         held_force=held_forces(system, reaction),
         reaction=forces_at_nodes(mesh, system.element, reaction.reshape(-1, 3)),
         volume=float(np.sum(elements.weights * J)),
         volume0=system.volume,
         J=J,
         weights=elements.weights,
-        penetration=max(contact.penetration(found.touch), overlap(found.faces)),
-        slippage=contact.slippage(found.touch),
+        penetration=max(contact.penetration(evaluation.touch), overlap(evaluation.faces)),
+        slippage=contact.slippage(evaluation.touch),
         newton_iterations=iterations,
         substeps=substeps,
         energy=assembly.energy(state.x, elements, material),
         cavity_pressure=state.x[system.field_count :].copy(),
-        cavity_volume=found.volumes,
+        cavity_volume=evaluation.volumes,
     )
 
 

@@ -146,10 +146,10 @@ def continued(system: System, state: State) -> State:
 def unbalanced(system: System, state: State) -> np.ndarray | None:
     """The dead forces (field_count,) with which a state would be in equilibrium; None where an element is inverted."""
     loads = system.loads_of(state)
-    found = system.evaluate(state.x, loads, tangent=False)
-    if not found.usable:
+    evaluation = system.evaluate(state.x, loads, tangent=False)
+    if not evaluation.usable:
         return None
-    missing = found.residual[: system.field_count].copy()
+    missing = evaluation.residual[: system.field_count].copy()
     missing[system.pattern.held] = 0.0
     return missing
 
@@ -172,8 +172,8 @@ def repaired(system: System, x: np.ndarray) -> np.ndarray:
             break
         u = x[:n].reshape(-1, 3)
         near, middle = sides[bad].reshape(-1, 3)[:, :2], sides[bad].reshape(-1, 3)[:, 2]
-        wanted = u.copy()
-        wanted[middle] = u[near].mean(axis=1)
+        target = u.copy()
+        target[middle] = u[near].mean(axis=1)
         if attempt:
             around = np.isin(table, table[bad]).any(axis=1)
             total, count = np.zeros_like(u), np.zeros(len(u))
@@ -181,6 +181,6 @@ def repaired(system: System, x: np.ndarray) -> np.ndarray:
             np.add.at(total, table[around], mean[:, None])
             np.add.at(count, table[around], 1.0)
             inner = np.unique(table[bad])
-            wanted[inner] = 0.5 * (u[inner] + total[inner] / count[inner, None])
-        x[:n] = np.where(free, wanted, u).ravel()
+            target[inner] = 0.5 * (u[inner] + total[inner] / count[inner, None])
+        x[:n] = np.where(free, target, u).ravel()
     return x

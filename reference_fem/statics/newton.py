@@ -50,30 +50,30 @@ def solve_step(system: System, state: State, t: float, load: float, more: np.nda
     target, stiffness = system.held_at(t), 1.0
     force, filling = system.force_at(t, load) + more, system.filling_at(t, load)
     loads = Loads(force, system.obstacles_at(t), state.pressure, filling, grip=state.hold, faces=state.face_pressure)
-    x, found, before = state.x, first_guess(system, state, loads), None
-    if not found.usable:
+    x, evaluation, before = state.x, first_guess(system, state, loads), None
+    if not evaluation.usable:
         raise StepFailed("an element of the state that the step starts from is inverted")
     for iteration in range(1, system.settings.max_iterations + 1):
-        change, guess, face_guess = direction(system, found, x, target)
+        change, guess, face_guess = direction(system, evaluation, x, target)
         grip = let_go(loads.grip, guess) if iteration > HESITATION else loads.grip
         loads = loads._replace(guess=guess, face_guess=face_guess, grip=grip)
-        x, found = search(system, x, change, loads, before)
+        x, evaluation = search(system, x, change, loads, before)
         arrived = np.array_equal(x[system.pattern.held], target)
-        off = misplaced(system, x, found)
-        if arrived and settled(found, system.settings, LOOSE if off else 1.0):
+        off = misplaced(system, x, evaluation)
+        if arrived and settled(evaluation, system.settings, LOOSE if off else 1.0):
             if not off:
-                hold = contact.renewed_grip(found.touch, system.sticks, system.surface, x)
-                settled_in = State(t, load, x, loads.multiplier, found.touch.pressure, iteration)
-                settled_in = replace(settled_in, faces=loads.faces, face_pressure=found.faces.pressure)
+                hold = contact.renewed_grip(evaluation.touch, system.sticks, system.surface, x)
+                settled_in = State(t, load, x, loads.multiplier, evaluation.touch.pressure, iteration)
+                settled_in = replace(settled_in, faces=loads.faces, face_pressure=evaluation.faces.pressure)
                 return replace(settled_in, stiffness=stiffness, grip=loads.grip, hold=hold)
             stiffness *= PENALTY_GROWTH
-            grip = loads.grip._replace(traction=found.touch.traction)
-            loads = loads._replace(multiplier=found.touch.pressure, stiffness=stiffness, grip=grip)
-            loads = loads._replace(faces=found.faces.pressure)
-            found = system.evaluate(x, loads)
-        before = found
+            grip = loads.grip._replace(traction=evaluation.touch.traction)
+            loads = loads._replace(multiplier=evaluation.touch.pressure, stiffness=stiffness, grip=grip)
+            loads = loads._replace(faces=evaluation.faces.pressure)
+            evaluation = system.evaluate(x, loads)
+        before = evaluation
     raise StepFailed(
-        f"{system.settings.max_iterations} Newton iterations left a relative force error of {found.errors[0]:.1e}"
+        f"{system.settings.max_iterations} Newton iterations left a relative force error of {evaluation.errors[0]:.1e}"
     )
 
 
@@ -94,34 +94,38 @@ def let_go(grip: contact.Grip, guess: np.ndarray):
     return grip._replace(stuck=grip.stuck & (guess > 0.0)) if grip.stuck.size else grip
 
 
-def direction(system: System, found: Evaluation, x: np.ndarray, target: np.ndarray):
+def direction(system: System, evaluation: Evaluation, x: np.ndarray, target: np.ndarray):
     """Newton's change at x, which also takes the held unknowns to their target; and the contact pressures to expect.
 
     Raises StepFailed where the tangent is singular: a shorter step may pass by.
     """
     try:
-        tangent = Tangent(system, found)
+        tangent = Tangent(system, evaluation)
         change = tangent.newton(target - x[system.pattern.held])
         if len(system.rows) or len(system.faces.dofs):
             return active_set.settled(system, tangent, x, change)
-        return change, NO_GUESS, found.faces.guess
+        return change, NO_GUESS, evaluation.faces.guess
     except SingularTangent as singular:
         raise StepFailed(str(singular)) from singular
 
 
-def settled(found: Evaluation, settings: NewtonSettings, slack: float):
+def settled(evaluation: Evaluation, settings: NewtonSettings, slack: float):
     """Whether both relative errors are below their tolerances times slack, and what holds a point also presses it."""
-    if contact.mistaken(found.touch):
+    if contact.mistaken(evaluation.touch):
         return False
-    return found.errors[0] <= slack * settings.force_tol and found.errors[1] <= slack * settings.volume_tol
+    return evaluation.errors[0] <= slack * settings.force_tol and evaluation.errors[1] <= slack * settings.volume_tol
 
 
-def misplaced(system: System, x: np.ndarray, found: Evaluation):
+def misplaced(system: System, x: np.ndarray, evaluation: Evaluation):
     """Whether contact acts farther from an obstacle's surface, or from where it stuck, than its share of the largest
     displacement."""
     allowed = system.settings.penetration_tol * np.abs(x[: system.displacement_count]).max()
     return (
-        max(contact.misplacement(found.touch), contact.slippage(found.touch), misplacement_of_faces(found.faces))
+        max(
+            contact.misplacement(evaluation.touch),
+            contact.slippage(evaluation.touch),
+            misplacement_of_faces(evaluation.faces),
+        )
         > allowed
     )
 
@@ -131,8 +135,8 @@ def search(system: System, x: np.ndarray, direction: np.ndarray, loads: Loads, b
     share = 1.0
     while share > 1e-2:
         trial = x + share * direction
-        found = system.evaluate(trial, loads)
-        if found.usable and (before is None or found.errors.max() <= MERIT_GROWTH * before.errors.max()):
-            return trial, found
+        evaluation = system.evaluate(trial, loads)
+        if evaluation.usable and (before is None or evaluation.errors.max() <= MERIT_GROWTH * before.errors.max()):
+            return trial, evaluation
         share *= 0.5
     raise StepFailed("no share of Newton's step keeps the elements upright and the error in bounds")

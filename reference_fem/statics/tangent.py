@@ -12,12 +12,12 @@ class Tangent:
     cavity, no dense row in the pattern (docs/theory.md, eq. 6.7).
     """
 
-    def __init__(self, system: System, found: Evaluation):
-        self.system, self.found = system, found
-        system.solver.factor(system.pattern.upper(found.values))
+    def __init__(self, system: System, evaluation: Evaluation):
+        self.system, self.evaluation = system, evaluation
+        system.solver.factor(system.pattern.upper(evaluation.values))
         if system.lumens:
-            self.columns = system.solver.solve(np.asfortranarray(found.gradients[:, system.pattern.free].T))
-            self.matrix = found.gradients[:, system.pattern.free] @ self.columns
+            self.columns = system.solver.solve(np.asfortranarray(evaluation.gradients[:, system.pattern.free].T))
+            self.matrix = evaluation.gradients[:, system.pattern.free] @ self.columns
             for k, lumen in enumerate(system.lumens):
                 if lumen.by_pressure:
                     self.matrix[k] = np.eye(len(system.lumens))[k]
@@ -39,7 +39,7 @@ class Tangent:
         change[system.pattern.held] = lifted
         change[system.pattern.free] = system.solver.solve(forces, checked)
         if system.lumens:
-            right = misfits - self.found.gradients @ change[:m]
+            right = misfits - self.evaluation.gradients @ change[:m]
             for k, lumen in enumerate(system.lumens):
                 if lumen.by_pressure:
                     right[k] = np.broadcast_to(misfits, right.shape)[k]
@@ -49,6 +49,6 @@ class Tangent:
 
     def newton(self, lift: np.ndarray):
         """Newton's change of all unknowns (total,), by `lift` (m,) at the held ones."""
-        system, found = self.system, self.found
-        forces = -found.residual[system.pattern.free] - system.pattern.lifting(found.values) @ lift
-        return self.respond(forces, -found.residual[system.field_count :], lift)
+        system, evaluation = self.system, self.evaluation
+        forces = -evaluation.residual[system.pattern.free] - system.pattern.lifting(evaluation.values) @ lift
+        return self.respond(forces, -evaluation.residual[system.field_count :], lift)

@@ -27,15 +27,15 @@ def add_elements(
     triangles. Pi = sum w W(F, p). r_u = w P·grad N, r_p = w (J - 1 - p/kappa) M.
     """
     dofs, gradients, pressures, weights, sizes = elements
-    known, whole = len(sizes.unknowns), 3 * len(sizes.functions) + len(sizes.pressures)
+    unknown_count, whole = len(sizes.unknowns), 3 * len(sizes.functions) + len(sizes.pressures)
     ue, re = np.zeros(whole), np.empty(whole)
     K = np.empty((whole, whole))
     smallest = np.inf
     for e in range(dofs.shape[0]):
-        for a in range(known):
+        for a in range(unknown_count):
             ue[a] = x[dofs[e, a]]
-        if known < whole:
-            ue[known] = mean_pressure(ue, gradients[e], weights[e], sizes.functions, parameters)
+        if unknown_count < whole:
+            ue[unknown_count] = mean_pressure(ue, gradients[e], weights[e], sizes.functions, parameters)
         re[:] = 0.0
         K[:] = 0.0
         J = integrate_element(
@@ -44,14 +44,14 @@ def add_elements(
         smallest = min(smallest, J)
         if not J > 0.0:
             return J
-        for a in range(known):
+        for a in range(unknown_count):
             residual[dofs[e, a]] += re[a]
         if tangent:
-            if known < whole:
-                condense(K, known)
+            if unknown_count < whole:
+                condense(K, unknown_count)
             slot = 0
-            for a in range(known):
-                for b in range(a, known):
+            for a in range(unknown_count):
+                for b in range(a, unknown_count):
                     values[positions[e, slot]] += K[a, b]
                     slot += 1
     return smallest
@@ -168,11 +168,11 @@ def add_pressure_blocks(
 
 def deformation(x: np.ndarray, elements: Elements, kappa: float):
     """F (ne, nq, 3, 3) and p (ne, nq) [Pa] at the quadrature points, in plain NumPy; kappa [Pa] of the material."""
-    known, count = elements.dofs.shape[1], 3 * len(elements.sizes.functions)
+    unknown_count, count = elements.dofs.shape[1], 3 * len(elements.sizes.functions)
     local = x[elements.dofs]
     u = local[:, :count].reshape(len(local), 3, -1)
     F = np.eye(3) + np.einsum("eia,eqra->eqir", u, elements.gradients)
-    if known > count:
+    if unknown_count > count:
         return F, local[:, count:] @ elements.pressures.T
     change = np.linalg.det(F) - 1.0
     mean = np.sum(elements.weights * change, axis=1) / elements.weights.sum(axis=1)
@@ -187,8 +187,8 @@ def energy(x: np.ndarray, elements: Elements, material: Material):
 
 def vertex_pressure(x: np.ndarray, elements: Elements, mesh: MeshTet, kappa: float):
     """Pressure at the vertices [Pa], (N1,): the unknowns themselves, or the mean of the elements around each."""
-    known, count = elements.dofs.shape[1], 3 * len(elements.sizes.functions)
-    if known > count:
+    unknown_count, count = elements.dofs.shape[1], 3 * len(elements.sizes.functions)
+    if unknown_count > count:
         return x[len(x) - mesh.nvertices :].copy()
     _, p = deformation(x, elements, kappa)
     volume, corners = elements.weights.sum(axis=1), mesh.t[:4].T

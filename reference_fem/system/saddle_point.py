@@ -148,17 +148,17 @@ class System:
 
     def held_at(self, t: float):
         """Prescribed values of the held unknowns at time t; refuses regions that contradict each other."""
-        wanted = np.full(self.field_count, np.nan)
+        target = np.full(self.field_count, np.nan)
         for k, held in enumerate(self.held):
-            value, there = held.displacement(t), wanted[held.dofs]
+            value, there = held.displacement(t), target[held.dofs]
             clash = np.abs(value - there) > 1e-9 * (np.abs(value) + np.abs(there))
             if clash.any():
                 raise SolveError(
                     f"held region {k} prescribes {value[clash][0]:g} m where an earlier one prescribes "
                     f"{there[clash][0]:g} m at t = {t:g} s: let them not overlap, or agree"
                 )
-            wanted[held.dofs] = value
-        return wanted[self.pattern.held]
+            target[held.dofs] = value
+        return target[self.pattern.held]
 
     def evaluate(self, x: np.ndarray, loads: Loads, tangent: bool = True) -> Evaluation:
         """Residual and, if wanted, tangent at x under the loads."""
@@ -178,11 +178,11 @@ class System:
                 contact.add_contact(x, self.surface, touch, values, residual, tangent)
             if len(self.faces.dofs):
                 add_faces(x, self.faces, between, values, residual, tangent)
-            for k, (lumen, wanted) in enumerate(zip(self.lumens, loads.filling, strict=True)):
+            for k, (lumen, filling) in enumerate(zip(self.lumens, loads.filling, strict=True)):
                 pressure = x[self.field_count + k]
                 volumes[k] = lumen.add(x, pressure, gradients[k], values, tangent)
                 residual[: self.field_count] -= pressure * gradients[k]
-                residual[self.field_count + k] = (pressure if lumen.by_pressure else volumes[k]) - wanted
+                residual[self.field_count + k] = (pressure if lumen.by_pressure else volumes[k]) - filling
         errors = self.relative_errors(x, residual, touch, loads.force, gradients)
         return Evaluation(residual, values, J, touch, errors, volumes, gradients, between)
 

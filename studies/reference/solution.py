@@ -44,9 +44,9 @@ class _Remembering(Evaluator):
             self.located[key] = super().locate(points)
         return self.located[key]
 
-    def improve(self, points: np.ndarray, open_: np.ndarray, count: int, found: tuple[np.ndarray, np.ndarray]) -> None:
+    def improve(self, points: np.ndarray, open_: np.ndarray, count: int, places: tuple[np.ndarray, np.ndarray]) -> None:
         """As Evaluator's, without the elements whose box is farther off than the nearest element so far."""
-        element, local = found
+        element, local = places
         count = min(count, len(self.table))
         near = self.tree.query(points[open_], k=count)[1].reshape(len(open_), count)
         here = points[open_][:, None]

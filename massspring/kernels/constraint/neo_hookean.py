@@ -52,7 +52,7 @@ def relax_elements(contacts, inverse_mass, elements, y, scale, multiplier, push)
         if not shear > 0.0:
             idle = True
             continue
-        grown = f[0] * c[0] + f[1] * c[1] + f[2] * c[2] - elements.wanted[e, 0] - mu / bulk
+        grown = f[0] * c[0] + f[1] * c[1] + f[2] * c[2] - elements.target_ratio[e, 0] - mu / bulk
         own, mixed, other = mobilities(contacts, inverse_mass, elements, f, c, shear, e)
         soft, hard = 1.0 / (mu * volume), 1.0 / (bulk * volume)
         a00, a01, a11 = scale * own + soft, scale * mixed, scale * other + hard

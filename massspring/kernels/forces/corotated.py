@@ -101,7 +101,7 @@ def corotated_energy(elements, x):
     for e in range(elements.node.shape[0]):
         f = deformation(elements, x, e, 0)
         _, s, _ = rotation(f)
-        square, missing = dot_nine(f, f), s - 2.0 - elements.wanted[e, 0]
+        square, missing = dot_nine(f, f), s - 2.0 - elements.target_ratio[e, 0]
         density = 0.5 * mu * (square - 3.0) - 2.0 * mu * (s - 3.0) + 0.5 * second * missing * missing
         total += elements.weight[e, 0] * density
     return total
@@ -117,7 +117,7 @@ def corotated_forces_into(elements, x, force):
         f = deformation(elements, x, e, 0)
         r, s, defined = rotation(f)
         idle |= not defined
-        turned, volume = second * (s - 2.0 - elements.wanted[e, 0]) - 2.0 * mu, elements.weight[e, 0]
+        turned, volume = second * (s - 2.0 - elements.target_ratio[e, 0]) - 2.0 * mu, elements.weight[e, 0]
         for a in range(node.shape[1]):
             i = node[e, a]
             g0, g1, g2 = volume * gradient[e, 0, a, 0], volume * gradient[e, 0, a, 1], volume * gradient[e, 0, a, 2]
@@ -196,7 +196,7 @@ def add_corotated_stiffness(elements, places, x, factor, exact, data):
             continue
         turn_gradients(elements, r, e)
         if exact:
-            turned = second * (s - 2.0 - elements.wanted[e, 0]) - 2.0 * mu
+            turned = second * (s - 2.0 - elements.target_ratio[e, 0]) - 2.0 * mu
             corotated_block(elements, elements.weight[e, 0], turned, turning(f, r, s))
         else:
             corotated_block(elements, elements.weight[e, 0], -2.0 * mu, (0.5, 0.0, 0.0, 0.5, 0.0, 0.5))

@@ -24,7 +24,7 @@ class Elements(NamedTuple):
     """w_q [m³], (k, q)."""
     constants: np.ndarray
     """mu, K and the bulk modulus b of the springs' own volume term [Pa], (3,)."""
-    wanted: np.ndarray
+    target_ratio: np.ndarray
     """J* of each point: what its target is over its rest volume [1], (k, q); of the step at hand."""
     area: np.ndarray
     """Scratch: D_a = w cof F ∇N_a [m²] of one point, (a, 3)."""
@@ -75,7 +75,7 @@ def open_element_point(elements, f, e, q):
 def point_pressure(elements, ratio, e, q):
     """p = mu − b (J − 1) − K (J − J*) [Pa] (eq. 13.4)."""
     mu, bulk, local = elements.constants
-    return mu - local * (ratio - 1.0) - bulk * (ratio - elements.wanted[e, q])
+    return mu - local * (ratio - 1.0) - bulk * (ratio - elements.target_ratio[e, q])
 
 
 @njit_lean
@@ -88,7 +88,7 @@ def element_energy(elements, x):
             f00, f01, f02, f10, f11, f12, f20, f21, f22 = deformation(elements, x, e, q)
             c0, c1, c2 = f11 * f22 - f12 * f21, f12 * f20 - f10 * f22, f10 * f21 - f11 * f20
             grown = f00 * c0 + f01 * c1 + f02 * c2 - 1.0
-            missing = grown + 1.0 - elements.wanted[e, q]
+            missing = grown + 1.0 - elements.target_ratio[e, q]
             density = -mu * grown + 0.5 * local * grown * grown + 0.5 * bulk * missing * missing
             total += elements.weight[e, q] * density
     return total

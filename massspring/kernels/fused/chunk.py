@@ -29,10 +29,10 @@ def total(tile, at):
     for eight in range(8, LANES, 8):
         for lane in range(8):
             tile[at + lane] += tile[at + eight + lane]
-    found = 0.0
+    amount = 0.0
     for lane in range(8):
-        found += tile[at + lane]
-    return found
+        amount += tile[at + lane]
+    return amount
 
 
 @njit_inlined

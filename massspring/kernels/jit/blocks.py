@@ -15,7 +15,7 @@ def any_gap_within(gap, begin, reach):
     """
     if begin + BLOCK > gap.shape[0]:
         return True
-    block, found = flat(gap, begin, begin + BLOCK), 0
+    block, near = flat(gap, begin, begin + BLOCK), 0
     for i in range(BLOCK):
-        found += not block[i] > reach
-    return found > 0
+        near += not block[i] > reach
+    return near > 0

@@ -35,14 +35,14 @@ class ByAddress(types.Type):
     places: where each field begins [bytes], and its type; size: of all fields [bytes]
     """
 
-    def __init__(self, made: type, fields: list[types.Type]) -> None:
-        self.made, self.fields, self.size = made, tuple(fields), 0
+    def __init__(self, tuple_type: type, fields: list[types.Type]) -> None:
+        self.tuple_type, self.fields, self.size = tuple_type, tuple(fields), 0
         self.places: dict[str, tuple[int, types.Type]] = {}
-        for name, field in zip(made._fields, fields, strict=True):  # pyright: ignore[reportAttributeAccessIssue]
+        for name, field in zip(tuple_type._fields, fields, strict=True):  # pyright: ignore[reportAttributeAccessIssue]
             self.places[name] = self.size, field
-            self.size += _size(made, name, field)
-        words = "\0".join((made.__module__, *map(str, fields)))
-        super().__init__(f"{made.__name__}.{hashlib.sha256(words.encode()).hexdigest()[:12]}")
+            self.size += _size(tuple_type, name, field)
+        words = "\0".join((tuple_type.__module__, *map(str, fields)))
+        super().__init__(f"{tuple_type.__name__}.{hashlib.sha256(words.encode()).hexdigest()[:12]}")
 
     def leaves(self, path: tuple[int, ...] = (), begin: int = 0) -> Iterator[tuple[int, ...]]:
         """Of each number and array: DEPTH indices that lead to it, -1 for none; where it is to be [bytes]; how it is
@@ -56,28 +56,30 @@ class ByAddress(types.Type):
                 yield *here, *(-1 for _ in range(DEPTH - len(here))), begin + place, how
 
 
-def by_address(made: Tuple) -> Tuple:
+def by_address(tuple_type: Tuple) -> Tuple:
     """Decorates a named tuple of arrays, numbers, None and other such tuples."""
 
-    @typeof_impl.register(made)
+    @typeof_impl.register(tuple_type)
     def type_of(value: Any, context: Any) -> ByAddress:
         return ByAddress(type(value), [typeof_impl(item, context) for item in value])
 
-    return made
+    return tuple_type
 
 
 def _item_size(array: types.Array) -> int:
     return as_dtype(array.dtype).itemsize
 
 
-def _size(made: type, name: str, field: types.Type) -> int:
+def _size(tuple_type: type, name: str, field: types.Type) -> int:
     if isinstance(field, types.Array):
         return (5 + 2 * field.ndim) * WORD
     if isinstance(field, ByAddress):
         return field.size
     if field in NUMBERS or field is types.none:
         return 0 if field is types.none else WORD
-    raise TypeError(f"{made.__name__}.{name} is of type {field}; by address go arrays, numbers, None and such tuples")
+    raise TypeError(
+        f"{tuple_type.__name__}.{name} is of type {field}; by address go arrays, numbers, None and such tuples"
+    )
 
 
 register_model(ByAddress)(models.OpaqueModel)
@@ -121,9 +123,9 @@ def _at(builder: Any, address: Any, place: int, kind: Any) -> Any:
 
 def _read(builder: Any, address: Any, place: int, kind: Any) -> Any:
     """Nothing changes what is there while compiled code runs: a loop need not read it again after it has written."""
-    found = builder.load(_at(builder, address, place, kind))
-    found.set_metadata("invariant.load", builder.module.add_metadata([]))
-    return found
+    value = builder.load(_at(builder, address, place, kind))
+    value.set_metadata("invariant.load", builder.module.add_metadata([]))
+    return value
 
 
 @unbox(ByAddress)
@@ -171,15 +173,15 @@ def _gather(module: Any) -> Any:
         for index in numbers[:DEPTH]:
             with builder.if_then(builder.icmp_signed(">=", index, WHOLE(0))):
                 builder.store(call("PyTuple_GetItem", ADDRESS, builder.load(item), index), item)
-        found, target = builder.load(item), builder.gep(begin, [numbers[DEPTH]])
+        value, target = builder.load(item), builder.gep(begin, [numbers[DEPTH]])
         with is_read(NUMBERS[types.float64]):
-            builder.store(call("PyFloat_AsDouble", real, found), _at(builder, target, 0, real))
+            builder.store(call("PyFloat_AsDouble", real, value), _at(builder, target, 0, real))
         with is_read(NUMBERS[types.int64]):
-            builder.store(call("PyLong_AsLongLong", WHOLE, found), _at(builder, target, 0, WHOLE))
+            builder.store(call("PyLong_AsLongLong", WHOLE, value), _at(builder, target, 0, WHOLE))
         with is_read(NUMBERS[types.boolean]):
-            builder.store(builder.trunc(call("PyObject_IsTrue", code, found), BYTE), target)
+            builder.store(builder.trunc(call("PyObject_IsTrue", code, value), BYTE), target)
         with is_read(0, ">"):
-            wrong = builder.icmp_signed("!=", call("numba_adapt_ndarray", code, found, target), code(0))
+            wrong = builder.icmp_signed("!=", call("numba_adapt_ndarray", code, value, target), code(0))
             size = builder.load(_at(builder, target, 3 * WORD, WHOLE))
             wrong = builder.or_(wrong, builder.icmp_signed("!=", size, numbers[-1]))
             builder.store(builder.or_(builder.load(failed), wrong), failed)

@@ -35,14 +35,14 @@ def _flat(context: Any, builder: Any, signature: Any, args: Any) -> Any:
     first, last = (context.cast(builder, args[k], signature.args[k], types.intp) for k in (1, 2))
     source = context.make_array(table)(context, builder, args[0])
     width = cgutils.unpack_tuple(builder, source.shape)[1] if table.ndim == 2 else ir.Constant(word, 1)
-    found = context.make_array(signature.return_type)(context, builder)
+    view = context.make_array(signature.return_type)(context, builder)
     # Without a parent: the view borrows what its caller keeps alive, and no references are counted.
     populate_array(
-        found,
+        view,
         data=builder.gep(source.data, [builder.mul(first, width)]),
         shape=[builder.mul(builder.sub(last, first), width)],
         strides=[source.itemsize],
         itemsize=source.itemsize,
         meminfo=None,
     )
-    return found._getvalue()
+    return view._getvalue()

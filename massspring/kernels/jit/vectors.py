@@ -126,12 +126,12 @@ def _shuffled(builder: Any, a: Any, b: Any, order: list[int]) -> Any:
 
 def _address(context: Any, builder: Any, kind: Any, array: Any, indices: list[tuple[Any, Any]]) -> Any:
     """Where a number of a contiguous table is."""
-    made = context.make_array(kind)(context, builder, array)
+    table = context.make_array(kind)(context, builder, array)
     at = [context.cast(builder, value, of, types.intp) for value, of in indices]
     if len(at) == 1:
-        return builder.gep(made.data, at)
-    width = cgutils.unpack_tuple(builder, made.shape)[1]
-    return builder.gep(made.data, [builder.add(builder.mul(at[0], width), at[1])])
+        return builder.gep(table.data, at)
+    width = cgutils.unpack_tuple(builder, table.shape)[1]
+    return builder.gep(table.data, [builder.add(builder.mul(at[0], width), at[1])])
 
 
 def _bytes(kind: Any) -> int:

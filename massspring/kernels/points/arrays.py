@@ -49,7 +49,7 @@ class FacetRows(NamedTuple):
     """Scratch: the gap that a point at no speed would end with, less what may be left inside [m], (f, p)."""
     start: np.ndarray
     """Scratch: where a point is at the start of the step [m], (f, p, 3)."""
-    known: np.ndarray
+    last_force: np.ndarray
     """Scratch: the force on a point before it is corrected [N], (f, p, 3)."""
     pressed: np.ndarray
     """Scratch: whether a facet had a force when it was last looked at, (f,) bool."""

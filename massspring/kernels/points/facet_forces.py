@@ -129,7 +129,7 @@ def give_back(facets, speed, inverse_mass, dt, count):
         for q in range(facets.shape.shape[0]):
             now = force_at(facets, f, q)
             for axis in range(3):
-                facets.change[q, axis] = now[axis] - facets.known[f, q, axis]
+                facets.change[q, axis] = now[axis] - facets.last_force[f, q, axis]
         tell_nodes(facets, speed, inverse_mass, dt, f)
 
 
@@ -196,7 +196,7 @@ def corrections_into(nodes, facets, boundary, step, speed, field, inverse_mass, 
         f = facets.near[k]
         for q in range(facets.shape.shape[0]):
             f0, f1, f2 = force_at(facets, f, q)
-            known = facets.known[f, q]
-            add_at_point(facets, field, (f0 - known[0], f1 - known[1], f2 - known[2]), f, q)
+            last = facets.last_force[f, q]
+            add_at_point(facets, field, (f0 - last[0], f1 - last[1], f2 - last[2]), f, q)
             if facets.contact_id[f, q] > 0:
                 book(facets, boundary, step, speed, contact_impulse, f, q)

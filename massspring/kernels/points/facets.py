@@ -102,7 +102,7 @@ def add_at_point(facets, field, force, f, q):
 
 
 @njit_lean
-def known_forces_into(nodes, facets, boundary, step, field):
+def last_forces_into(nodes, facets, boundary, step, field):
     """What all points had in the last step [N], along the normals of now, into `field` (n, 3)."""
     field[:] = 0.0
     for f in range(facets.node.shape[0]):
@@ -122,12 +122,12 @@ def prepare_point(facets, boundary, step, state, f, q):
     """
     y, u = state
     dt, left = boundary.dt, False
-    known = force_at(facets, f, q)
+    force = force_at(facets, f, q)
     o, gap, n0, n1, n2 = deepest(boundary, step, (y[0] + dt * u[0], y[1] + dt * u[1], y[2] + dt * u[2]))
     may_touch = gap < facets.reach[f] or facets.contact_id[f, q] == o + 1
     facets.candidate[f, q] = o + 1 if may_touch else 0
     for axis in range(3):
-        facets.known[f, q, axis], facets.start[f, q, axis] = known[axis], y[axis]
+        facets.last_force[f, q, axis], facets.start[f, q, axis] = force[axis], y[axis]
     if facets.contact_id[f, q] not in (0, o + 1):
         left = facets.pressing[f, q] > 0.0
         forget(facets, f, q)
@@ -145,10 +145,10 @@ def list_near(facets, nodes, boundary, step, speed):
     them that lost a contact, or −1."""
     count, lost = 0, -1
     for f in range(facets.node.shape[0]):
-        wanted = not is_far(facets, nodes, boundary, step, f)
+        near = not is_far(facets, nodes, boundary, step, f)
         for q in range(facets.shape.shape[0]):
-            wanted |= facets.contact_id[f, q] > 0
-        if wanted:
+            near |= facets.contact_id[f, q] > 0
+        if near:
             facets.near[count] = f
             count += 1
             for q in range(facets.shape.shape[0]):

@@ -83,7 +83,7 @@ class Probing(NamedTuple):
     """(p,) int64."""
     time: np.ndarray
     """When a tip passes through each near triangle, 0 … 1 of the step, or more, (f,)."""
-    found: np.ndarray
+    passing: np.ndarray
     """Weights and direction of each passing, (f, 6)."""
     rows: Rows
     base: np.ndarray

@@ -50,7 +50,7 @@ def overshoot(stage, p, n):
     f = probes.near[p, n]
     square, free, length, shift = 0.0, 0.0, 0.0, (0.0, 0.0, 0.0)
     for k in range(3):
-        i, b = probes.surface[f, k], probes.found[n, k]
+        i, b = probes.surface[f, k], probes.passing[n, k]
         if probes.carried[i] > 0:
             square += b * b
             free += b
@@ -71,7 +71,7 @@ def overshoot(stage, p, n):
     for k in range(3):
         i = probes.surface[f, k]
         if probes.carried[i] > 0:
-            b = farther * probes.found[n, k]
+            b = farther * probes.passing[n, k]
             probes.push[i, 0] += b * shift[0]
             probes.push[i, 1] += b * shift[1]
             probes.push[i, 2] += b * shift[2]

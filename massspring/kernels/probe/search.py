@@ -37,7 +37,7 @@ def look(stage, p):
         if t <= 1.0:
             first = min(first, t)
             for k in range(3):
-                probes.found[n, k], probes.found[n, 3 + k] = pair.weight[k], pair.direction[k]
+                probes.passing[n, k], probes.passing[n, 3 + k] = pair.weight[k], pair.direction[k]
     probes.counts[TESTED] += probes.near_count[p]
     return first
 
@@ -52,7 +52,7 @@ def add_crossings(probes, p, first):
     for n in range(probes.near_count[p]):
         if probes.time[n] <= first + SAME_TIME:
             for k in range(3):
-                probes.pair.weight[k], probes.pair.direction[k] = probes.found[n, k], probes.found[n, 3 + k]
+                probes.pair.weight[k], probes.pair.direction[k] = probes.passing[n, k], probes.passing[n, 3 + k]
             room += set_row(probes.rows, p, probes.near[p, n], probes.surface, probes.pair)
     return room
 
@@ -88,12 +88,12 @@ def add_touches(stage, p):
 @njit_lean
 def search(stage):
     """Adds what the step as it stands runs into; (contacts that found room, whether a tip crosses)."""
-    found, crosses = 0, False
+    count, crosses = 0, False
     for p in range(stage.probes.radius.shape[0]):
         first = look(stage, p)
         if first <= 1.0:
             crosses = True
-            found += add_crossings(stage.probes, p, first)
+            count += add_crossings(stage.probes, p, first)
         else:
-            found += add_touches(stage, p)
-    return found, crosses
+            count += add_touches(stage, p)
+    return count, crosses

@@ -36,8 +36,8 @@ def meet_probes(stage, volumes, push):
     gather(stage, push)
     probes.rows.count[0] = 0
     for sweep in range(PASSES):
-        found, crosses = search(stage)
-        if found == 0 or sweep + 1 == PASSES:
+        count, crosses = search(stage)
+        if count == 0 or sweep + 1 == PASSES:
             break
         if sweep == 0:
             prepare(stage, volumes)

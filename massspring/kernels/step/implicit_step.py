@@ -15,6 +15,6 @@ def imbalance_into(model, nodes, rows, p, boundary, out):
     for i in range(p.shape[0]):
         m = model.mass[i]
         for axis in range(3):
-            known = dt * dt * (nodes.force[i, axis] + out[i, axis] + m * boundary.gravity[axis])
+            load = dt * dt * (nodes.force[i, axis] + out[i, axis] + m * boundary.gravity[axis])
             moved = (1.0 + boundary.damping * dt) * (p[i, axis] - nodes.x[i, axis])
-            out[i, axis] = m * (dt * nodes.v[i, axis] - moved) + known
+            out[i, axis] = m * (dt * nodes.v[i, axis] - moved) + load

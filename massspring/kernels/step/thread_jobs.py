@@ -27,9 +27,9 @@ def worker(frame, team, direction, rank):
     model, nodes, contacts, work, boundary = frame.model, frame.nodes, frame.contacts, frame.work, frame.boundary
     slices = team.slices[rank], team.slices[rank + 1]
     part = team.nodes[rank], team.nodes[rank + 1]
-    known = 0
+    round_number = 0
     while True:
-        known = wait_until_other_than(team.signal, ROUND, known)
+        round_number = wait_until_other_than(team.signal, ROUND, round_number)
         job, step = team.signal[JOB], team.signal[STEP]
         push = Push(direction, team.factor[0])
         if job == JOB_END:

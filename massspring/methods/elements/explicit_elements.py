@@ -36,8 +36,8 @@ from massspring.layout.state import State
 from massspring.methods.capabilities import Capabilities, No
 from massspring.methods.elements.laws import LawName, supported, why_not_corotated
 from massspring.methods.elements.tangent import elements_of
-from massspring.methods.families.known_pressure import check_modulus
 from massspring.methods.families.points import meet_points
+from massspring.methods.families.pressure_law import check_modulus
 from massspring.methods.method import Method, begin_frame
 from massspring.world.obstacles import Attachment
 
@@ -96,11 +96,11 @@ def quadratic_elements_frame(frame, rows, bulk_modulus):
 def follow_targets(elements, rest_volumes, target):
     """J* of each tetrahedron: the mean of what its nodal volumes want of their rest volumes."""
     for e in range(elements.node.shape[0]):
-        wanted = 0.0
+        ratio = 0.0
         for a in range(4):
             i = elements.node[e, a]
-            wanted += 0.25 * target[i] / rest_volumes[i]
-        elements.wanted[e, 0] = wanted
+            ratio += 0.25 * target[i] / rest_volumes[i]
+        elements.target_ratio[e, 0] = ratio
 
 
 @njit_lean

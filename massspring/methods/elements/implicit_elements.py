@@ -40,7 +40,7 @@ from massspring.methods.elements.laws import (
 )
 from massspring.methods.elements.newton import Ending, NewtonStep, Prepared, missing
 from massspring.methods.elements.tangent import Pattern, elements_of
-from massspring.methods.families.known_pressure import check_modulus
+from massspring.methods.families.pressure_law import check_modulus
 from massspring.methods.method import Method, begin_frame
 from massspring.world.obstacles import Attachment
 

@@ -15,7 +15,7 @@ from massspring.kernels.step.attachments import add_held_impulse
 from massspring.layout.state import State
 from massspring.methods.elements.friction import RubbedContact
 from massspring.methods.elements.laws import Law
-from massspring.methods.elements.tangent import Pattern, Tangent, wanted_of
+from massspring.methods.elements.tangent import Pattern, Tangent, target_ratios
 from massspring.methods.implicit.contact import TouchedRows
 
 REVISIONS = 12
@@ -51,9 +51,9 @@ class Rows(TouchedRows):
 
     def pushes(self, impulses: np.ndarray, like: np.ndarray) -> np.ndarray:
         """Cᵀ γ [kg m], in the shape of `like` (n, 3)."""
-        found = np.zeros_like(like)
-        np.add.at(found, self.nodes, impulses[:, None] * self.direction)
-        return found
+        push = np.zeros_like(like)
+        np.add.at(push, self.nodes, impulses[:, None] * self.direction)
+        return push
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,22 +63,22 @@ class Prepared:
     body: Body
     elements: Elements
     pattern: Pattern
-    known: dict[tuple[float, float], np.ndarray]
+    constant_parts: dict[tuple[float, float], np.ndarray]
     """Step and damping -> data of the constant part of the tangent."""
     law: Law
 
     def constant(self, state: State, boundary: BoundaryConditions) -> np.ndarray:
         """Data of (1 + c dt) M + dt² K [kg]."""
         key = boundary.dt, boundary.damping
-        if key not in self.known:
-            self.known[key] = self.pattern.constant(state.model, *key)
-        return self.known[key]
+        if key not in self.constant_parts:
+            self.constant_parts[key] = self.pattern.constant(state.model, *key)
+        return self.constant_parts[key]
 
     def resistance(self, state: State, boundary: BoundaryConditions) -> np.ndarray:
         """The diagonal of that part [kg], (n,), 0 where held."""
-        found = np.zeros(len(state.model.mass))
-        found[self.pattern.free] = self.constant(state, boundary)[self.pattern.diagonal]
-        return found
+        diagonal = np.zeros(len(state.model.mass))
+        diagonal[self.pattern.free] = self.constant(state, boundary)[self.pattern.diagonal]
+        return diagonal
 
 
 class Ending(NamedTuple):
@@ -200,10 +200,10 @@ class NewtonStep:
         model, dt, moved = self.model, self.boundary.dt, p - self.nodes.x
         mass = model.mass[:, None]
         inertia = 0.5 * (1.0 + self.boundary.damping * dt) * float((mass * moved * moved).sum())
-        known = float((moved * (dt * mass * self.nodes.v + dt * dt * self.weight)).sum())
+        work = float((moved * (dt * mass * self.nodes.v + dt * dt * self.weight)).sum())
         springs = dt * dt * float(spring_energy(p, model.ends, model.rest_length, model.stiffness))
         volumes = dt * dt * float(self.prepared.law.energy(self.elements, p))
-        return inertia - known + springs + volumes, inertia + abs(known) + abs(springs) + abs(volumes)
+        return inertia - work + springs + volumes, inertia + abs(work) + abs(springs) + abs(volumes)
 
     def part_of(self, change: np.ndarray, given: np.ndarray) -> float:
         """How much of a linear step is taken, 1, ½, …: the potential less what obstacles give must fall (eq. 13.7)."""
@@ -231,7 +231,7 @@ class NewtonStep:
 
 def with_targets(prepared: Prepared, filling: np.ndarray) -> Elements:
     """The elements with what the kept volumes want of their rest volumes, (m,)."""
-    return prepared.elements._replace(wanted=wanted_of(prepared.body, filling))
+    return prepared.elements._replace(target_ratio=target_ratios(prepared.body, filling))
 
 
 def missing(prepared: Prepared, x: np.ndarray, filling: np.ndarray) -> np.ndarray:

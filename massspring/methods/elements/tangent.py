@@ -30,13 +30,13 @@ def elements_of(body: Body, bulk_modulus: float) -> Elements:
         gradient=np.ascontiguousarray(gradient),
         weight=np.ascontiguousarray(weight),
         constants=np.array([body.rest_pressure, bulk_modulus, body.local_bulk]),
-        wanted=np.ones(weight.shape),
+        target_ratio=np.ones(weight.shape),
         area=np.zeros((a, 3)),
         block=np.zeros((a, a, 3, 3)),
     )
 
 
-def wanted_of(body: Body, filling: np.ndarray) -> np.ndarray:
+def target_ratios(body: Body, filling: np.ndarray) -> np.ndarray:
     """J* of the points of all elements [1], (k, q): kept volumes want `filling` (m,) of what they have at rest."""
     if isinstance(body.kept, PointVolumes):
         return filling[body.kept.corner_volume] @ BARYCENTRIC.T
@@ -80,10 +80,10 @@ class Pattern:
         """Place among the data of the first entry of blocks (row, column), (b,) each; −1 where one is."""
         size, indptr = len(self.free), self.graph.indptr.astype(np.int64)
         keys = np.repeat(np.arange(size), np.diff(indptr)) * size + self.graph.indices
-        found = np.searchsorted(keys, row * size + column)
+        place = np.searchsorted(keys, row * size + column)
         inside = (row >= 0) & (column >= 0)
-        row, found = np.where(inside, row, 0), np.where(inside, found, 0)
-        return np.where(inside, 9 * indptr[row] + 3 * (found - indptr[row]), -1)
+        row, place = np.where(inside, row, 0), np.where(inside, place, 0)
+        return np.where(inside, 9 * indptr[row] + 3 * (place - indptr[row]), -1)
 
     def add_at_nodes(self, data: np.ndarray, nodes: np.ndarray, blocks: np.ndarray) -> None:
         """Adds `blocks` (c, 3, 3) [kg] of single free nodes (c,) to the data of a tangent."""
@@ -113,7 +113,7 @@ class Tangent:
         size = 3 * len(pattern.free)
         matrix = csc_array((data, pattern.indices, pattern.indptr), shape=(size, size))  # symmetric: rows are columns
         self._factor = _factored(matrix) if np.isfinite(data).all() else None
-        self._known: dict[tuple[int, bytes], np.ndarray] = {}
+        self._answers: dict[tuple[int, bytes], np.ndarray] = {}
 
     def respond(self, forces: np.ndarray) -> np.ndarray:
         """T⁻¹ `forces`, (n, 3) each; held nodes stay."""
@@ -127,18 +127,18 @@ class Tangent:
     def columns(self, nodes: np.ndarray, directions: np.ndarray) -> np.ndarray:
         """T⁻¹ of a unit force along each of `directions` (c, 3) at `nodes` (c,), (c, n, 3); each solved for once."""
         keys = [(int(node), direction.tobytes()) for node, direction in zip(nodes, directions, strict=True)]
-        new = [k for k, key in enumerate(keys) if key not in self._known]
+        new = [k for k, key in enumerate(keys) if key not in self._answers]
         if new:
             right = np.zeros((3 * len(self.pattern.free), len(new)))
             first = 3 * self.pattern.rank[nodes[new]]
             for axis in range(3):
                 right[first + axis, np.arange(len(new))] = directions[new, axis]
             for k, answer in zip(new, self._solve(right).T, strict=True):
-                self._known[keys[k]] = answer
-        found = np.zeros((len(keys), len(self.pattern.rank), 3))
+                self._answers[keys[k]] = answer
+        columns = np.zeros((len(keys), len(self.pattern.rank), 3))
         for c, key in enumerate(keys):
-            found[c, self.pattern.free] = self._known[key].reshape(-1, 3)
-        return found
+            columns[c, self.pattern.free] = self._answers[key].reshape(-1, 3)
+        return columns
 
 
 def _factored(matrix: csc_array) -> SuperLU | None:

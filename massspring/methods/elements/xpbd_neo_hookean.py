@@ -35,7 +35,7 @@ from massspring.methods.capabilities import Capabilities, No
 from massspring.methods.elements.explicit_elements import follow_targets
 from massspring.methods.elements.laws import has_nodal_volumes
 from massspring.methods.elements.tangent import elements_of
-from massspring.methods.families.known_pressure import check_modulus
+from massspring.methods.families.pressure_law import check_modulus
 from massspring.methods.method import Method, begin_frame
 from massspring.world.obstacles import Attachment
 

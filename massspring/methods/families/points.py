@@ -13,7 +13,7 @@ from massspring.kernels.jit.decorators import njit_inlined, njit_lean
 from massspring.kernels.jit.stage_clock import HELD, INTEGRATION, SEARCH, SPRINGS, VOLUME, end_stage
 from massspring.kernels.points.elements import measure_into, push_into
 from massspring.kernels.points.facet_forces import corrections_into
-from massspring.kernels.points.facets import known_forces_into
+from massspring.kernels.points.facets import last_forces_into
 from massspring.kernels.points.solve import (
     add_response,
     pushed_velocity_into,
@@ -78,7 +78,7 @@ def meet_points(frame, step, push, rows, implicit):
     if facets.node.shape[0] == 0:
         return search_contacts(frame, step, push)
     if boundary.radius.shape[0] > 0:
-        known_forces_into(nodes, facets, boundary, step, rows.field)
+        last_forces_into(nodes, facets, boundary, step, rows.field)
         add_response(model, nodes, rows, implicit, boundary.dt)
         pushed_velocity_into(model, nodes, frame.contacts, rows, implicit, boundary.dt)
         speed, impulse = rows.node_vector, frame.diagnostics.contact_impulse

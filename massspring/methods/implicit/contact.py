@@ -111,10 +111,10 @@ class Contact:
         normal, push = contacts.normal[nodes], pushes[nodes]
         pressed = np.einsum("ci,ci->c", normal, push)
         aside = push - pressed[:, None] * normal
-        asked = np.linalg.norm(aside, axis=1)
-        slips = asked > friction * pressed
+        drag = np.linalg.norm(aside, axis=1)
+        slips = drag > friction * pressed
         nodes, normal = nodes[slips], normal[slips]
-        self.friction_impulse[nodes] = (friction * pressed)[slips, None] * aside[slips] / asked[slips, None]
+        self.friction_impulse[nodes] = (friction * pressed)[slips, None] * aside[slips] / drag[slips, None]
         contacts.mode[nodes] = SLIDES
         contacts.v_target[nodes] = np.einsum("ci,ci->c", normal, contacts.v_target[nodes])[:, None] * normal
         return len(nodes)

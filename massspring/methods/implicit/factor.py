@@ -24,7 +24,7 @@ class Factor:
         self._triangular = triangular(matrix.tocsr()[free][:, free].tocsc(), free)
         self._place = np.full(n, -1)
         self._columns = np.empty((0, n))
-        self._known = 0
+        self._count = 0
 
     def respond(self, forces: np.ndarray) -> np.ndarray:
         """A⁻¹ `forces`, (n, 3) each."""
@@ -46,15 +46,15 @@ class Factor:
         for three in (new[k : k + 3] for k in range(0, len(new), 3)):
             units = np.zeros((len(self._place), 3))
             units[three, np.arange(len(three))] = 1.0
-            last = self._known + len(three)
-            self._columns[self._known : last] = self.respond(units).T[: len(three)]
-            self._place[three] = np.arange(self._known, last)
-            self._known = last
+            last = self._count + len(three)
+            self._columns[self._count : last] = self.respond(units).T[: len(three)]
+            self._place[three] = np.arange(self._count, last)
+            self._count = last
         return self._columns[self._place[nodes]]
 
     def _make_room(self, count: int) -> None:
         """Doubles the store of columns until `count` more fit."""
-        while self._known + count > len(self._columns):
+        while self._count + count > len(self._columns):
             more = np.empty((max(64, len(self._columns)), len(self._place)))
             self._columns = np.concatenate([self._columns, more])
 
@@ -72,16 +72,16 @@ def constant_matrix(model: Model, dt: float, damping: float) -> csr_array:
 def triangular(matrix: csc_array, nodes: np.ndarray) -> Triangular:
     """L D Lᵀ of a positive definite matrix whose columns belong to `nodes`, ordered by least degree."""
     options = {"SymmetricMode": True}
-    found = splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
-    assert np.array_equal(found.perm_r, found.perm_c)  # without a threshold no row leaves the diagonal
-    below = csc_array(tril(found.L, -1))
+    factor = splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
+    assert np.array_equal(factor.perm_r, factor.perm_c)  # without a threshold no row leaves the diagonal
+    below = csc_array(tril(factor.L, -1))
     below.sort_indices()
     return Triangular(
         start=below.indptr.astype(np.uint32),
         row=below.indices.astype(np.uint32),
         value=below.data,
-        inverse_pivot=1.0 / found.U.diagonal(),
-        node=nodes[np.argsort(found.perm_c)].astype(np.uint32),
+        inverse_pivot=1.0 / factor.U.diagonal(),
+        node=nodes[np.argsort(factor.perm_c)].astype(np.uint32),
         scratch=np.zeros((len(nodes), 4)),
     )
 
@@ -90,10 +90,10 @@ class Factors:
     """The factors of a run: one for each step length and damping it has seen."""
 
     def __init__(self) -> None:
-        self._known: dict[tuple[float, float], Factor] = {}
+        self._factors: dict[tuple[float, float], Factor] = {}
 
     def at(self, model: Model, dt: float, damping: float) -> Factor:
         """The factor for steps of `dt` [s] with `damping` [1/s]."""
-        if (dt, damping) not in self._known:
-            self._known[dt, damping] = Factor(model, dt, damping)
-        return self._known[dt, damping]
+        if (dt, damping) not in self._factors:
+            self._factors[dt, damping] = Factor(model, dt, damping)
+        return self._factors[dt, damping]

@@ -90,12 +90,12 @@ class ElasticResponse(Method):
     def advance(self, state: State, boundary: BoundaryConditions) -> State:
         """One frame."""
         after = begin_frame(state, boundary)
-        known: Precomputed = after.memory
-        held, nodes, diagnostics = known.held, after.nodes, after.diagnostics
-        weighed = held.rest + (known.sag @ boundary.gravity).reshape(-1, 3)
+        memory: Precomputed = after.memory
+        held, nodes, diagnostics = memory.held, after.nodes, after.diagnostics
+        weighed = held.rest + (memory.sag @ boundary.gravity).reshape(-1, 3)
         for step in range(len(boundary.position)):
             free = weighed + (held.follow @ boundary.held_displacement[step].ravel()).reshape(-1, 3)
-            pressed = press(after, boundary, step, free, Columns(known))
+            pressed = press(after, boundary, step, free, Columns(memory))
             diagnostics.held_impulse[:] += held.held_impulse((pressed.end - held.rest).ravel(), boundary)
             pressed.book(boundary, diagnostics.contact_impulse)
             nodes.v[:] = (pressed.end - nodes.x) / boundary.dt
@@ -136,15 +136,15 @@ def precomputed(held: LinearBody, model: Model) -> Precomputed:
 class Columns:
     """The response along rows from the columns of their nodes."""
 
-    def __init__(self, known: Precomputed) -> None:
-        self._known = known
+    def __init__(self, memory: Precomputed) -> None:
+        self._memory = memory
         self._rows = np.empty((0, 0, 3))
 
     def compliance(self, rows: TouchedRows) -> np.ndarray:
         """How far row b moves along its direction by 1 N along row a [m/N], symmetric, (c, c)."""
-        known = self._known
-        columns = known.columns[known.place[rows.nodes]]
-        self._rows = np.einsum("ri,rij->rj", rows.direction, columns).reshape(len(columns), *known.held.rest.shape)
+        memory = self._memory
+        columns = memory.columns[memory.place[rows.nodes]]
+        self._rows = np.einsum("ri,rij->rj", rows.direction, columns).reshape(len(columns), *memory.held.rest.shape)
         return np.einsum("abi,bi->ab", self._rows[:, rows.nodes], rows.direction)
 
     def moved(self, rows: TouchedRows, pushes: np.ndarray) -> np.ndarray:

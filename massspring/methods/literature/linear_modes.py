@@ -113,10 +113,10 @@ class Modes:
             omega = np.sqrt(self.square)
             rate = np.zeros((len(omega), 3, 3))  # of (ω q, q̇, load)
             rate[:, 0, 1], rate[:, 1, 0], rate[:, 1, 1], rate[:, 1, 2] = omega, -omega, -damping, 1.0
-            found = expm(dt * rate)[:, :2]
-            found[:, 0] /= omega[:, None]
-            found[:, :, 0] *= omega[:, None]
-            self.exact[dt, damping] = found
+            matrix = expm(dt * rate)[:, :2]
+            matrix[:, 0] /= omega[:, None]
+            matrix[:, :, 0] *= omega[:, None]
+            self.exact[dt, damping] = matrix
         return self.exact[dt, damping]
 
 

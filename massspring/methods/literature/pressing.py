@@ -104,9 +104,9 @@ def complementary(compliance: np.ndarray, missing: np.ndarray) -> np.ndarray:
         return missing
     if not (np.isfinite(compliance).all() and np.isfinite(missing).all()):
         return np.full_like(missing, np.nan)  # numbers are lost: the run ends
-    found = exchanged(compliance, missing)
-    if found is not None:
-        return found
+    forces = exchanged(compliance, missing)
+    if forces is not None:
+        return forces
     root = cholesky(compliance + SOFTNESS * compliance.diagonal().max() * np.eye(len(missing)))
     from scipy.optimize import nnls  # 0.15 s that every command would wait for
 

@@ -25,7 +25,7 @@ from massspring.kernels.forces.corotated import (
     rotation,
 )
 from massspring.kernels.forces.springs import spring_energy, spring_forces_into
-from massspring.methods.elements.tangent import Pattern, elements_of, wanted_of
+from massspring.methods.elements.tangent import Pattern, elements_of, target_ratios
 from tests.massspring.elements.solids import MU, curved_solid, deformation, linear_solid
 from tests.massspring.methods.test_methods import squeeze
 from tests.massspring.methods.test_quadratic_motion import CONTRACT
@@ -47,7 +47,7 @@ def elements(solid):
     """With targets that differ from volume to volume."""
     filling = 1.0 + 0.1 * np.random.default_rng(0).standard_normal(solid.kept.count)
     found = elements_of(solid, BULK)
-    return found._replace(wanted=wanted_of(solid, filling))
+    return found._replace(target_ratio=target_ratios(solid, filling))
 
 
 def nearest(f):
@@ -113,9 +113,9 @@ def test_the_energy_is_that_of_its_definition(solid, elements):
     f, weight = deformation(solid, x)
     r = np.array([nearest(one) for one in f])
     strain = np.einsum("eki,ekj->eij", r, f) - np.eye(3)
-    missing = np.trace(strain, axis1=1, axis2=2) + 1.0 - elements.wanted.ravel()
+    missing = np.trace(strain, axis1=1, axis2=2) + 1.0 - elements.target_ratio.ravel()
     defined = float(weight @ (MU * (strain**2).sum(axis=(1, 2)) + 0.5 * SECOND * missing**2))
-    rest = 0.5 * SECOND * float(weight @ (1.0 - elements.wanted.ravel()) ** 2)
+    rest = 0.5 * SECOND * float(weight @ (1.0 - elements.target_ratio.ravel()) ** 2)
     above = energy(solid, elements, x) - energy(solid, elements, solid.rest)
     assert above == pytest.approx(defined - rest, rel=1e-9)
 

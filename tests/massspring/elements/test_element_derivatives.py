@@ -9,7 +9,7 @@ from massspring import Attachment, Clock, ImplicitElements, Plane, Setup
 from massspring.kernels.forces.elements import add_element_stiffness, element_energy, element_forces_into
 from massspring.kernels.forces.springs import spring_energy, spring_forces_into
 from massspring.methods.elements.newton import NewtonStep
-from massspring.methods.elements.tangent import Pattern, elements_of, wanted_of
+from massspring.methods.elements.tangent import Pattern, elements_of, target_ratios
 from tests.massspring.elements.solids import MU, curved_solid, deformation, energy_without_volume, linear_solid
 from tests.massspring.quadratic import jiggled
 
@@ -26,7 +26,7 @@ def elements(solid):
     """With targets that differ from volume to volume."""
     filling = 1.0 + 0.1 * np.random.default_rng(0).standard_normal(solid.kept.count)
     found = elements_of(solid, BULK)
-    return found._replace(wanted=wanted_of(solid, filling))
+    return found._replace(target_ratio=target_ratios(solid, filling))
 
 
 def energy(body, elements, x):
@@ -45,8 +45,8 @@ def test_the_energy_is_that_of_its_definition(solid, elements):
     """Springs and elements together, above what they are at rest."""
     x = jiggled(solid)
     f, weight = deformation(solid, x)
-    own = 0.5 * BULK * float(weight @ (np.linalg.det(f) - elements.wanted.ravel()) ** 2)
-    rest = 0.5 * BULK * float(weight @ (1.0 - elements.wanted.ravel()) ** 2)
+    own = 0.5 * BULK * float(weight @ (np.linalg.det(f) - elements.target_ratio.ravel()) ** 2)
+    rest = 0.5 * BULK * float(weight @ (1.0 - elements.target_ratio.ravel()) ** 2)
     above = energy(solid, elements, x) - energy(solid, elements, solid.rest)
     assert above == pytest.approx(energy_without_volume(solid, x) + own - rest, rel=1e-9)
 

@@ -41,13 +41,13 @@ def one():
     single = elements._replace(
         **{name: getattr(elements, name)[:1] for name in ("node", "gradient", "weight", "wanted")}
     )
-    return single._replace(wanted=np.array([[1.04]])), jiggled(body), XpbdNeoHookean().start(body)
+    return single._replace(target_ratio=np.array([[1.04]])), jiggled(body), XpbdNeoHookean().start(body)
 
 
 def constraints(elements, x):
     """(C_D, C_H) [1] of the one tetrahedron, by definition."""
     f = np.einsum("ai,aj->ij", x[elements.node[0]], elements.gradient[0, 0])
-    return np.array([np.sqrt((f * f).sum()), np.linalg.det(f) - elements.wanted[0, 0] - 1.0 / RATIO])
+    return np.array([np.sqrt((f * f).sum()), np.linalg.det(f) - elements.target_ratio[0, 0] - 1.0 / RATIO])
 
 
 def slopes(elements, x):

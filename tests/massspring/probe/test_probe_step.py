@@ -160,7 +160,7 @@ def led(weight, held, radius=0.0):
     after, boundary = begin_frame(setup.start(), setup.boundary(0)), setup.boundary(0)
     probing = after.probing
     corners = probing.surface[0].astype(int)
-    probing.near[0, 0], probing.found[0, :3], probing.radius[0] = 0, weight, radius
+    probing.near[0, 0], probing.passing[0, :3], probing.radius[0] = 0, weight, radius
     probing.velocity[corners] = 0.1 * rng.normal(size=(3, 3))
     probing.pair.tip[:] = 1e-3 * rng.normal(size=(2, 3))
     probing.carried[np.delete(corners, held)] = 1

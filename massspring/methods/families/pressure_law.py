@@ -27,7 +27,7 @@ PENALTY, GAS, PYRAMIDS = 0, 1, 2
 
 
 @compiled
-def known_pressure(model, nodes, bulk_modulus, law, volume, target):
+def pressure_now(model, nodes, bulk_modulus, law, volume, target):
     """lam [Pa] of the volume now (eq. 10.8, 10.10)."""
     if law == GAS:
         return bulk_modulus * (target / volume - 1.0) if volume > 0.0 else np.inf
@@ -44,7 +44,7 @@ def pressure_frame(frame, bulk_modulus, law):
     open_frame(frame)
     for step in range(boundary.position.shape[0]):
         volume, mobility = begin_step(frame, step, True)
-        lam = known_pressure(model, nodes, bulk_modulus, law, volume, boundary.volume_target[step, 0])
+        lam = pressure_now(model, nodes, bulk_modulus, law, volume, boundary.volume_target[step, 0])
         if not mobility > 0.0:
             lam = 0.0
             diagnostics.singular[0] += 1
