@@ -39,7 +39,7 @@ def one():
     body = linear_solid((1, 1, 1))
     elements = elements_of(body, RATIO * MU)
     single = elements._replace(
-        **{name: getattr(elements, name)[:1] for name in ("node", "gradient", "weight", "wanted")}
+        **{name: getattr(elements, name)[:1] for name in ("node", "gradient", "weight", "target_ratio")}
     )
     return single._replace(target_ratio=np.array([[1.04]])), jiggled(body), XpbdNeoHookean().start(body)
 
