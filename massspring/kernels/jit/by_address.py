@@ -139,7 +139,7 @@ def _gathered(group: Any, value: Any, c: Any) -> NativeValue:
     failed = builder.call(_gather(builder.module), [value, table, WHOLE(len(rows)), room])
     with builder.if_then(failed, likely=False):
         c.pyapi.err_set_string(
-            "PyExc_TypeError", f"{group.made.__name__}: an array is not of the type it is meant to be"
+            "PyExc_TypeError", f"{group.tuple_type.__name__}: an array is not of the type it is meant to be"
         )
     # Hidden, so that the compiler does not read from there before all is gathered.
     hidden = builder.asm(ir.FunctionType(ADDRESS, [ADDRESS]), "", "=r,0,~{memory}", [room], side_effect=True)
