@@ -10,7 +10,7 @@ from massspring import Capsule, Obstacle, Plane, Trajectory
 from massspring.body.surface import winding_number
 from studies.base.errors import StudyError
 from studies.base.lookup import lookup
-from studies.geometry.api.scans import Remeshing, mended_surface
+from studies.geometry.api.scans import Remeshing, repaired_surface
 from studies.geometry.files.opening import opened
 from studies.geometry.organs import SHAPES
 from studies.geometry.organs.make_shape import make_shape
@@ -45,7 +45,7 @@ def check_scene(scene: Scene) -> list[str]:
     """
     check_clock(scene)
     _check_names(scene)
-    found = [
+    remarks = [
         *_unusual(scene, "shear modulus", scene.tissue.shear_modulus, MODULUS, "Pa"),
         *_unusual(scene, "density", scene.tissue.density, DENSITY, "kg/m³"),
         *_unusual(scene, "duration", scene.duration, DURATION, "s"),
@@ -54,27 +54,27 @@ def check_scene(scene: Scene) -> list[str]:
     for cut in scene.cuts:
         check_cuttable(scene, cut)
     if not scene.obstacles and not scene.held and not scene.cuts:
-        return found
+        return remarks
     try:
         points, triangles = surface_of(scene.organ, scene.name)
     except StudyError as error:
         if scene.organ.shape != "file":
             raise
-        return [*found, f"the cases of scene '{scene.name}' will fail: {error}"]
+        return [*remarks, f"the cases of scene '{scene.name}' will fail: {error}"]
     size = float(np.linalg.norm(np.ptp(points, axis=0)))
     samples = np.concatenate([points, *(points[triangles[:, side]].mean(axis=1) for side in SIDES)])
     for number, obstacle in enumerate(scene.obstacles):
-        found += _too_large(scene, f"obstacle {number}", _width(obstacle), size)
-        found += _too_large(scene, f"the path of obstacle {number}", _reach(obstacle.path), size)
+        remarks += _too_large(scene, f"obstacle {number}", _width(obstacle), size)
+        remarks += _too_large(scene, f"the path of obstacle {number}", _reach(obstacle.path), size)
         if scene.start is None or not scene.start.shaped:
             _check_start(scene, number, depth_at_start(obstacle, points, triangles, has_wall(scene)), size)
-        found += _pressed_through(scene, number, points)
-        found += _pressed_into_held(scene, number, samples, size)
+        remarks += _pressed_through(scene, number, points)
+        remarks += _pressed_into_held(scene, number, samples, size)
     for held in scene.held:
-        found += _too_large(scene, f"the path of region '{held.name}'", _reach(held.path), size)
+        remarks += _too_large(scene, f"the path of region '{held.name}'", _reach(held.path), size)
         _check_region(scene, held.name, held.region.level(points), points, triangles)
     check_cuts(scene, (points, triangles))
-    return found
+    return remarks
 
 
 def surface_of(organ: Organ, name: str) -> Surface:
@@ -95,8 +95,8 @@ def _scan_surface(parameters: str, name: str) -> Surface:
     source, how = scanned(Organ("file", json.loads(parameters)), name)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # the mesh warns of every change to the surface
-        mended, _ = mended_surface(source, opened(source), Remeshing(**how))
-    return mended.points, mended.triangles
+        surface, _ = repaired_surface(source, opened(source), Remeshing(**how))
+    return surface.points, surface.triangles
 
 
 def depth_at_start(obstacle: Obstacle, points: np.ndarray, triangles: np.ndarray, hollow: bool = False) -> float:

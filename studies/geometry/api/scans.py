@@ -32,7 +32,7 @@ from studies.geometry.scanned.level_grid import grid_from, shape_of
 from studies.geometry.shape.levelset import Shape
 from studies.geometry.shape.regions import PaintedRegion, Region, region_to_dict
 from studies.geometry.surface.painted import painted_region
-from studies.geometry.surface.repair import Mended, border, mend
+from studies.geometry.surface.repair import RepairedSurface, border, mend
 
 LEVEL_KEYS = ("name", "solid", "smooth")
 """Of a recipe: what decides the true shape, besides the surface itself."""
@@ -105,22 +105,22 @@ def scan(
     """
     source, remeshing = as_source(path, unit), Remeshing(**how)
     name, content = source.path.name, opened(source)
-    mended, recipe = mended_surface(source, content, remeshing)
+    surface, recipe = repaired_surface(source, content, remeshing)
     remeshing.check_count(nodes, name)
     if nodes is None:
-        body = as_it_is(mended, recipe, fill)
+        body = as_it_is(surface, recipe, fill)
         if regions is None:
             return with_patches(body, content, source.metres(content.longest_side, content.unit))
         return attach(body, regions) if regions else body
     if remeshing.solid is None:
-        check_watertight(mended, name)
+        check_watertight(surface, name)
     remeshing.check(name)
     if regions is None:
         regions = {key: painted_on(source, content, key) for key in marked_nodes(content)}
     outlines = {key: region_to_dict(region) for key, region in regions.items()}
     recipe |= remeshing.recipe | {"kind": "scan", "nodes": int(nodes), "fill": bool(fill), "regions": outlines}
-    grid = level_arrays(recipe, mended) if remeshing.on_shape else {}
-    mesh = mesh_from(recipe, {"points": mended.points, "triangles": mended.triangles} | grid)
+    grid = level_arrays(recipe, surface) if remeshing.on_shape else {}
+    mesh = mesh_from(recipe, {"points": surface.points, "triangles": surface.triangles} | grid)
     check_amount(mesh.volume + mesh.lumen_volume, name)
     for sentence in warnings_of(mesh.losses):
         warnings.warn(f"{name}: {sentence}", stacklevel=2)
@@ -139,8 +139,8 @@ def painted_on(source: Source, content: Content, name: str) -> PaintedRegion:
     """The same of a file that is open."""
     marked, file = marked_nodes(content), source.path.name
     if name not in marked:
-        known = f"the patches {', '.join(marked)}" if marked else "no point data called patch_NAME"
-        raise StudyError(f"{file} has {known}; there is no '{name}' among them")
+        patches = f"the patches {', '.join(marked)}" if marked else "no point data called patch_NAME"
+        raise StudyError(f"{file} has {patches}; there is no '{name}' among them")
     return painted_region(*in_metres(source, content), marked[name], f"{file}: the painted patch '{name}'")
 
 
@@ -150,31 +150,31 @@ def true_shape_of(source: Source, **how: Any) -> Shape:
     remeshing, name = Remeshing(**how), source.path.name
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # the meshes of the shape tell of every change
-        mended, recipe = mended_surface(source, opened(source), remeshing)
+        surface, recipe = repaired_surface(source, opened(source), remeshing)
     if remeshing.solid is None:
-        check_watertight(mended, name)
+        check_watertight(surface, name)
     remeshing.check(name)
     recipe |= remeshing.recipe
-    return shape_of(grid_from(level_arrays(recipe, mended)), recipe["name"], remeshing.wall)
+    return shape_of(grid_from(level_arrays(recipe, surface)), recipe["name"], remeshing.wall)
 
 
-def level_arrays(recipe: Mapping[str, Any], mended: Mended) -> dict[str, np.ndarray]:
+def level_arrays(recipe: Mapping[str, Any], surface: RepairedSurface) -> dict[str, np.ndarray]:
     """The grid of the true shape of a repaired surface; recipe: of a scan."""
     deciding = {key: recipe[key] for key in LEVEL_KEYS if key in recipe} | {"kind": "level"}
-    return level_of(deciding, {"points": mended.points, "triangles": mended.triangles})
+    return level_of(deciding, {"points": surface.points, "triangles": surface.triangles})
 
 
-def mended_surface(source: Source, content: Content, remeshing: Remeshing) -> tuple[Mended, dict[str, Any]]:
+def repaired_surface(source: Source, content: Content, remeshing: Remeshing) -> tuple[RepairedSurface, dict[str, Any]]:
     """The surface of a file, welded and repaired, and the recipe of the file. Warns of every change."""
     path = source.path
     welded = weld(*in_metres(source, content))
     # What a shell encloses needs no closed surface, and all parts of it.
-    mended = mend(*welded, path.name, remeshing.holes) if remeshing.solid is None else Mended(*welded, ())
-    for sentence in mended.remarks:
+    surface = mend(*welded, path.name, remeshing.holes) if remeshing.solid is None else RepairedSurface(*welded, ())
+    for sentence in surface.remarks:
         warnings.warn(f"{path.name}: {sentence}", stacklevel=3)
-    said = {"sha256": source.sha256, "unit": source.unit or content.unit or "m"}
-    recipe: dict[str, Any] = {"kind": "file", "name": stem_of(path), "file": path.name} | said
-    return mended, recipe | {"holes": bool(remeshing.holes)} | source.recipe
+    identity = {"sha256": source.sha256, "unit": source.unit or content.unit or "m"}
+    recipe: dict[str, Any] = {"kind": "file", "name": stem_of(path), "file": path.name} | identity
+    return surface, recipe | {"holes": bool(remeshing.holes)} | source.recipe
 
 
 def raw_surface(path: Path) -> tuple[np.ndarray, np.ndarray]:
@@ -207,23 +207,23 @@ def in_metres(source: Source, content: Content) -> tuple[np.ndarray, np.ndarray]
     return points * metres, triangles
 
 
-def as_it_is(mended: Mended, recipe: dict[str, Any], fill: bool) -> OrganMesh:
+def as_it_is(surface: RepairedSurface, recipe: dict[str, Any], fill: bool) -> OrganMesh:
     """The repaired surface with the file's own triangles, filled when asked."""
-    check_surface(mended.points, mended.triangles, recipe["file"])
-    check_one_part(mended.triangles, recipe["file"])
-    check_amount(signed_volume(mended.points, mended.triangles), recipe["file"])
+    check_surface(surface.points, surface.triangles, recipe["file"])
+    check_one_part(surface.triangles, recipe["file"])
+    check_amount(signed_volume(surface.points, surface.triangles), recipe["file"])
     none = np.empty((0, 4), np.int64)
-    surface = OrganMesh(recipe["name"], mended.points, mended.triangles, none, len(mended.points), {}, recipe)
-    return fill_mesh(surface) if fill else surface
+    mesh = OrganMesh(recipe["name"], surface.points, surface.triangles, none, len(surface.points), {}, recipe)
+    return fill_mesh(mesh) if fill else mesh
 
 
-def check_watertight(mended: Mended, name: str) -> None:
+def check_watertight(surface: RepairedSurface, name: str) -> None:
     """Raise StudyError unless the surface has an inside: no border, and a volume."""
-    left = len(border(mended.triangles))
+    left = len(border(surface.triangles))
     if left:
         raise StudyError(f"{name}: the surface is open at {left} edges; close the holes (--close-holes)")
-    check_volume(mended.points, mended.triangles, name)
-    check_amount(signed_volume(mended.points, mended.triangles), name)
+    check_volume(surface.points, surface.triangles, name)
+    check_amount(signed_volume(surface.points, surface.triangles), name)
 
 
 def check_amount(volume: float, name: str) -> None:

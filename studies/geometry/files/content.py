@@ -40,13 +40,13 @@ class Content:
     @property
     def longest_side(self) -> float:
         """Of the box around the finite points that a cell uses, in the file's unit; 0 where there are none."""
-        used = self.points[np.unique(self.cells)] if self.uses_known_points else self.points
+        used = self.points[np.unique(self.cells)] if self.has_all_points else self.points
         finite = used[np.isfinite(used).all(axis=1)]
         # Halved before the difference: coordinates may be as large as numbers get.
         return 2.0 * float(np.ptp(finite / 2.0, axis=0).max()) if len(finite) else 0.0
 
     @property
-    def uses_known_points(self) -> bool:
+    def has_all_points(self) -> bool:
         """Whether no cell names a point that is not there."""
         return bool(self.cells.min(initial=0) >= 0 and self.cells.max(initial=-1) < len(self.points))
 
@@ -60,7 +60,7 @@ def check_content(content: Content, name: str) -> Content:
         raise StudyError(f"{name}: points have shape {points.shape}; a body needs three coordinates per point")
     if not len(content.cells):
         raise StudyError(f"{name}: the file has no triangles and no tetrahedra; export a surface or a volume mesh")
-    if not content.uses_known_points:
+    if not content.has_all_points:
         worst = int(content.cells.max()) if content.cells.min() >= 0 else int(content.cells.min())
         raise StudyError(
             f"{name}: a cell uses point {worst}, but the file has only {len(points)} points; export it again"

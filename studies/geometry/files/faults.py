@@ -11,7 +11,7 @@ from xml.etree.ElementTree import ParseError
 from studies.base.errors import StudyError
 from studies.geometry.files.estimate import HEADER, check_whole, is_ascii_stl, is_text
 
-KNOWN = "STL, PLY, OBJ, OFF, VTK, VTU, VTP, MSH, glTF, or a label mask in NIfTI or NRRD"
+FORMATS = "STL, PLY, OBJ, OFF, VTK, VTU, VTP, MSH, glTF, or a label mask in NIfTI or NRRD"
 """What can be given instead."""
 HEAD = 65_536
 """Bytes in which a header stands."""
@@ -63,7 +63,7 @@ def check_promises(path: Path) -> None:
         head = file.read(HEAD)
     check_stl(path, head)
     check_whole(path)
-    kind = known_kind(head)
+    kind = other_kind(head)
     if kind is not None:
         raise unreadable(path, f"it is {kind}")
     if head.startswith(PACKED) and not path.name.lower().endswith((".nii.gz", ".nrrd.gz")):
@@ -83,30 +83,30 @@ def check_stl(path: Path, head: bytes) -> None:
     kind = next((kind for first, kind in NO_STL.items() if head.startswith(first)), None)
     if kind is not None:
         raise unreadable(path, f"it is not an STL file but {kind}: give it the ending of its format")
-    if is_text(head[:HEADER]) and not head.lstrip().startswith(b"solid") and known_kind(head) is None:
+    if is_text(head[:HEADER]) and not head.lstrip().startswith(b"solid") and other_kind(head) is None:
         raise unreadable(path, "it is not an STL file: it is text without facets")
 
 
-def known_kind(head: bytes) -> str | None:
+def other_kind(head: bytes) -> str | None:
     """The kind of a file that is not a mesh, by its first bytes."""
     return next((kind for first, kind in OTHER_KINDS.items() if head.lstrip().lower().startswith(first.lower())), None)
 
 
 def unreadable(path: Path, reason: str) -> StudyError:
     """The sentence for a file that is not a mesh."""
-    return StudyError(f"{path.name} is not a mesh that can be read ({reason}); give {KNOWN}")
+    return StudyError(f"{path.name} is not a mesh that can be read ({reason}); give {FORMATS}")
 
 
-def reason_of(path: Path, error: BaseException, said: str) -> str:
-    """Why a reader failed on the file, from the file first, then from what the reader `said`, then its error."""
+def reason_of(path: Path, error: BaseException, output: str) -> str:
+    """Why a reader failed on the file, from the file first, then from the `output` of the reader, then its error."""
     end = ENDS.get(path.suffix.lower())
     if (end and end not in tail(path)) or is_open_stl(path):
         return "it is cut short: its end is missing"
     comma = comma_of(path)
     if comma:
         return comma
-    told = sentence_in(said) or (sentence_in(str(error)) if "ReadError" in type(error).__name__ else "")
-    return told or next((words for kinds, words in WORDS if isinstance(error, kinds)), OTHERWISE)
+    sentence = sentence_in(output) or (sentence_in(str(error)) if "ReadError" in type(error).__name__ else "")
+    return sentence or next((words for kinds, words in WORDS if isinstance(error, kinds)), OTHERWISE)
 
 
 OTHERWISE = "its content does not follow its format"
@@ -122,9 +122,9 @@ WORDS: tuple[tuple[tuple[type[BaseException], ...], str], ...] = (
 )
 
 
-def sentence_in(said: str) -> str:
+def sentence_in(text: str) -> str:
     """The first line of a reader's own words that a person understands; "" where there is none."""
-    for line in said.splitlines():
+    for line in text.splitlines():
         line = " ".join(line.split()).removeprefix("Error: ").rstrip(".")
         if line and not re.search(r"Couldn't read|\w+Error\b|\w+Exception\b|Traceback|<class|0x[0-9a-f]{6}|/", line):
             return line[:120]

@@ -30,18 +30,18 @@ def read_points(path: Path) -> tuple[np.ndarray, dict[str, np.ndarray]]:
         raise StudyError(f"there is no file {path}")
     try:
         with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
-            found = meshio.read(path)
+            grid = meshio.read(path)
     except (Exception, SystemExit) as error:  # a file of another program: meshio's readers raise whatever they meet
         raise StudyError(f"{path.name} cannot be read as a grid ({str(error).splitlines()[:1]})") from error
-    points = np.asarray(found.points, dtype=np.float64)
-    return points, {name: np.asarray(values) for name, values in found.point_data.items()}
+    points = np.asarray(grid.points, dtype=np.float64)
+    return points, {name: np.asarray(values) for name, values in grid.point_data.items()}
 
 
 def read_cells(path: Path, kind: str) -> np.ndarray:
     """The cells of a type ("tetra", "tetra10") in a grid, (k, m). Raises StudyError where there are none."""
     if not path.is_file():
         raise StudyError(f"there is no file {path}")
-    found = [block.data for block in meshio.read(path).cells if block.type == kind]
-    if not found:
+    blocks = [block.data for block in meshio.read(path).cells if block.type == kind]
+    if not blocks:
         raise StudyError(f"{path.name} holds no cells of type {kind}")
-    return np.concatenate(found).astype(np.int64)
+    return np.concatenate(blocks).astype(np.int64)

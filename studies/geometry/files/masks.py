@@ -57,13 +57,13 @@ def is_mask(path: Path) -> bool:
     return path.name.lower().endswith((*NIFTI, *NRRD))
 
 
-def read_mask(path: Path, wanted: str | None) -> tuple[Content, str | None]:
-    """The surface of the label `wanted`, by number or name, or of the only one; and a remark where the image cuts it.
+def read_mask(path: Path, part: str | None) -> tuple[Content, str | None]:
+    """The surface of the label `part`, by number or name, or of the only one; and a remark where the image cuts it.
 
     Raises StudyError for an image that is no mask, a label that it does not hold, or several labels and none wanted.
     """
     mask = load_nrrd(path) if path.name.lower().endswith(NRRD) else load_nifti(path)
-    label = chosen_label(mask, wanted, path.name)
+    label = chosen_label(mask, part, path.name)
     points, triangles, cut = label_surface(mask, label)
     name = mask.names.get(label, str(label))
     remark = f"label {name} reaches the edge of the image: the organ is cut off flat there" if cut else None
@@ -78,8 +78,8 @@ def load_nifti(path: Path) -> Mask:
     except ImportError as error:
         raise missing("nibabel", path) from error
     image: Any = nibabel.load(path)
-    said = image.header.get_xyzt_units()[0] if hasattr(image.header, "get_xyzt_units") else ""
-    labels, unit = whole_numbers(np.asanyarray(image.dataobj), path), unit_of(said)
+    unit_name = image.header.get_xyzt_units()[0] if hasattr(image.header, "get_xyzt_units") else ""
+    labels, unit = whole_numbers(np.asanyarray(image.dataobj), path), unit_of(unit_name)
     return Mask(labels, np.asarray(image.affine, float), unit or "mm", {}, by_custom=unit is None)
 
 
@@ -97,11 +97,11 @@ def load_nrrd(path: Path) -> Mask:
     affine[:3, 3] = np.asarray(header.get("space origin", np.zeros(3)), float)
     names = {}
     for key, value in header.items():
-        found = re.fullmatch(r"Segment(\d+)_LabelValue", key)
-        if found:
-            names[int(value)] = str(header.get(f"Segment{found[1]}_Name", value))
-    said = str(next(iter(header.get("space units", [])), "")).strip('"')
-    return Mask(whole_numbers(data, path), affine, unit_of(said), names)
+        match = re.fullmatch(r"Segment(\d+)_LabelValue", key)
+        if match:
+            names[int(value)] = str(header.get(f"Segment{match[1]}_Name", value))
+    unit_name = str(next(iter(header.get("space units", [])), "")).strip('"')
+    return Mask(whole_numbers(data, path), affine, unit_of(unit_name), names)
 
 
 def missing(name: str, path: Path) -> StudyError:
@@ -112,9 +112,9 @@ def missing(name: str, path: Path) -> StudyError:
     )
 
 
-def unit_of(said: str) -> str | None:
+def unit_of(unit_name: str) -> str | None:
     """One of our units, or None where the header does not say or says another."""
-    return LONG_NAMES.get(said.lower())
+    return LONG_NAMES.get(unit_name.lower())
 
 
 def whole_numbers(data: np.ndarray, path: Path) -> np.ndarray:
@@ -156,20 +156,20 @@ def check_labels(labels: np.ndarray, count: int, name: str) -> None:
         raise no_mask(name, f"{count:,} different ones, and {1 - same / both:.0%} of neighbouring voxels differ")
 
 
-def chosen_label(mask: Mask, wanted: str | None, name: str) -> int:
+def chosen_label(mask: Mask, part: str | None, name: str) -> int:
     """The label asked for, by number or name. Raises StudyError where it cannot be determined."""
-    known = voxels_of(mask.labels)
-    if not known:
+    voxels = voxels_of(mask.labels)
+    if not voxels:
         raise StudyError(f"{name} holds no label: every voxel is 0; give the segmentation")
-    check_labels(mask.labels, len(known), name)
-    if wanted is None and len(known) == 1:
-        return next(iter(known))
-    by_name = {mask.names.get(k, str(k)).lower(): k for k in known} | {str(k): k for k in known}
-    if wanted is not None and wanted.lower() in by_name:
-        return by_name[wanted.lower()]
-    told = f"{name} holds {len(known)} label{'s' * (len(known) > 1)}: {listed(mask, known)}"
+    check_labels(mask.labels, len(voxels), name)
+    if part is None and len(voxels) == 1:
+        return next(iter(voxels))
+    by_name = {mask.names.get(k, str(k)).lower(): k for k in voxels} | {str(k): k for k in voxels}
+    if part is not None and part.lower() in by_name:
+        return by_name[part.lower()]
+    inventory = f"{name} holds {len(voxels)} label{'s' * (len(voxels) > 1)}: {listed(mask, voxels)}"
     raise StudyError(
-        f"{told}; choose one by --part" if wanted is None else f"{told}; there is no {wanted!r} among them"
+        f"{inventory}; choose one by --part" if part is None else f"{inventory}; there is no {part!r} among them"
     )
 
 
@@ -182,10 +182,10 @@ def voxels_of(labels: np.ndarray) -> dict[int, int]:
     return {int(k): int(n) for k, n in zip(numbers, counts, strict=True) if k != 0}
 
 
-def listed(mask: Mask, known: dict[int, int]) -> str:
+def listed(mask: Mask, voxels: dict[int, int]) -> str:
     """Labels with the number of their voxels, the largest first."""
-    order = sorted(known, key=lambda k: -known[k])
-    rows = [f"{k}{f' ({mask.names[k]})' if k in mask.names else ''} of {known[k]:,} voxels" for k in order[:OTHERS]]
+    order = sorted(voxels, key=lambda k: -voxels[k])
+    rows = [f"{k}{f' ({mask.names[k]})' if k in mask.names else ''} of {voxels[k]:,} voxels" for k in order[:OTHERS]]
     return ", ".join(rows) + (f" and {len(order) - OTHERS} more" if len(order) > OTHERS else "")
 
 

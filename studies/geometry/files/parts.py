@@ -31,28 +31,28 @@ class Part:
 def parts_in(content: Content) -> list[Part]:
     """The bodies of a surface; one of a body of tetrahedra, or of points that are no numbers."""
     numbers, names = numbered(content)
-    found = []
+    parts = []
     for k in range(int(numbers.max(initial=-1)) + 1):
         rows = content.triangles[numbers == k]
         size = np.ptp(content.points[np.unique(rows)], axis=0) if len(rows) else np.zeros(3)
         sides = float(size[0]), float(size[1]), float(size[2])
-        found.append(Part(k + 1, names[k] if names else "", len(rows), sides))
-    return found
+        parts.append(Part(k + 1, names[k] if names else "", len(rows), sides))
+    return parts
 
 
-def chosen(content: Content, wanted: str | None, name: str) -> Content:
+def chosen(content: Content, part: str | None, name: str) -> Content:
     """The part of a surface that is wanted, by name or number; all of it for None. Raises StudyError."""
-    if wanted is None:
+    if part is None:
         return content
     if len(content.tetrahedra):
         raise StudyError(f"{name} holds one body of tetrahedra and no parts; leave --part out")
     numbers, names = numbered(content)
     count = int(numbers.max(initial=-1)) + 1
-    known = {str(k + 1): k for k in range(count)}
+    by_number = {str(k + 1): k for k in range(count)}
     by_name = {label.lower(): k for k, label in reversed(list(enumerate(names)))}
-    number = by_name.get(wanted.lower(), known.get(wanted))
+    number = by_name.get(part.lower(), by_number.get(part))
     if number is None:
-        raise StudyError(f"{name} has {listed(names, count)}; there is no {wanted!r} among them")
+        raise StudyError(f"{name} has {listed(names, count)}; there is no {part!r} among them")
     return replace(content, triangles=content.triangles[numbers == number], names=(), part=numbers[:0])
 
 

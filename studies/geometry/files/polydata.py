@@ -75,13 +75,13 @@ class Legacy:
         return self._text_numbers(count, dtype.newbyteorder("="))
 
     def _text_numbers(self, count: int, dtype: np.dtype) -> np.ndarray:
-        found: list[bytes] = []
-        while len(found) < count:
+        tokens: list[bytes] = []
+        while len(tokens) < count:
             words = self.words()
             if not words:
                 raise meshio.ReadError(f"it is cut short: {count:,} of the declared numbers are missing")
-            found += words
-        return np.array(found[:count], dtype=float).astype(dtype)
+            tokens += words
+        return np.array(tokens[:count], dtype=float).astype(dtype)
 
 
 def read_legacy(path: Path) -> tuple[np.ndarray, Triangles]:
@@ -128,12 +128,12 @@ def cells(text: Legacy, first: int, second: int) -> tuple[np.ndarray, np.ndarray
 
 def cut(sizes: np.ndarray, corners: np.ndarray, strips: bool) -> Triangles:
     """Triangles (t, 3) of cells with so many corners; of strips every second one is turned round."""
-    starts, found = np.cumsum(sizes) - sizes, [np.empty((0, 3), np.int64)]
+    starts, triangles = np.cumsum(sizes) - sizes, [np.empty((0, 3), np.int64)]
     for size in np.unique(sizes[sizes > 2]):
         rows = corners[starts[sizes == size][:, None] + np.arange(size)]
         if not strips:
-            found.append(fans(rows))
+            triangles.append(fans(rows))
             continue
         turned = ([k, k + 1, k + 2] if k % 2 == 0 else [k + 1, k, k + 2] for k in range(int(size) - 2))
-        found.extend(rows[:, corner] for corner in turned)
-    return np.concatenate(found)
+        triangles.extend(rows[:, corner] for corner in turned)
+    return np.concatenate(triangles)

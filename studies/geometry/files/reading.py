@@ -32,10 +32,10 @@ def read_mesh(path: str | Path | Source, unit: str | None = None, flip: bool = F
     content = opened(source)
     check_finite(content.points, name)
     side = content.longest_side
-    said = source.unit or content.unit or "m"
-    metres = source.metres(side, said)
+    file_unit = source.unit or content.unit or "m"
+    metres = source.metres(side, file_unit)
     check_range(metres * side, name)
-    recipe = {"kind": "file", "name": source.path.stem, "file": name, "sha256": source.sha256, "unit": said}
+    recipe = {"kind": "file", "name": source.path.stem, "file": name, "sha256": source.sha256, "unit": file_unit}
     recipe |= {"flip": flip} | source.recipe
     points, cells = weld(content.points * metres, content.cells)
     warn_about_unit(points, name)

@@ -56,14 +56,14 @@ class Source:
         if self.unit is not None or self.scale != 1.0:
             raise StudyError(f"{name}: give the longest side, or a unit and a scale, but not both")
 
-    def metres(self, side: float, said: str | None) -> float:
-        """Metres per unit of the file, whose longest side is `side` and whose header states the unit `said`, or None.
+    def metres(self, side: float, header_unit: str | None) -> float:
+        """Metres per unit of the file, whose longest side is `side` and whose header states `header_unit`, or None.
 
         Raises StudyError where the unit has to be given.
         """
         if self.longest_side is not None:
             return self.longest_side / side if side > 0 else 1.0
-        return self.scale * UNITS[settled_unit(self.path.name, self.scale * side, self.unit or said)]
+        return self.scale * UNITS[settled_unit(self.path.name, self.scale * side, self.unit or header_unit)]
 
     @property
     def sha256(self) -> str | None:
@@ -116,10 +116,10 @@ def check_range(side: float, name: str, low: float = ABSURD[1], high: float = AB
 
 def length_of(text: str) -> float:
     """Metres of a length such as "19cm" or "190 mm". Raises StudyError for anything else."""
-    found = re.fullmatch(r"\s*([0-9.]+(?:[eE][-+]?\d+)?)\s*([a-z]+)\s*", text)
-    if not found or found[2] not in UNITS or found[1].count(".") > 1 or found[1] == ".":
+    match = re.fullmatch(r"\s*([0-9.]+(?:[eE][-+]?\d+)?)\s*([a-z]+)\s*", text)
+    if not match or match[2] not in UNITS or match[1].count(".") > 1 or match[1] == ".":
         raise StudyError(f"'{text}' is not a length; give a number and its unit ({', '.join(UNITS)}), such as 19cm")
-    return float(found[1]) * UNITS[found[2]]
+    return float(match[1]) * UNITS[match[2]]
 
 
 def likely_units(side: float) -> list[str]:

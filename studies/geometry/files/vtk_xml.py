@@ -18,7 +18,7 @@ ARRAY = re.compile(rb'<DataArray\b([^>]*?offset\s*=\s*"(\d+)"[^>]*?)(?:/>|>.*?</
 
 def as_grid(data: bytes) -> bytes:
     """The bytes of a VTP file as those of a VTU file. Raises ReadError for triangle strips."""
-    data = re.sub(rb"<Piece\b.*?</Piece>", lambda found: as_cells(found[0]), with_arrays(data), flags=re.DOTALL)
+    data = re.sub(rb"<Piece\b.*?</Piece>", lambda match: as_cells(match[0]), with_arrays(data), flags=re.DOTALL)
     return data.replace(b"PolyData", b"UnstructuredGrid")
 
 
@@ -47,10 +47,10 @@ def with_arrays(data: bytes) -> bytes:
     size = np.dtype(order + ("u8" if b'header_type="UInt64"' in text else "u4"))
     packed = b"compressor=" in text
 
-    def inline(found: re.Match[bytes]) -> bytes:
-        head, body = block(blob, int(found[2]), size, packed)
+    def inline(match: re.Match[bytes]) -> bytes:
+        head, body = block(blob, int(match[2]), size, packed)
         content = base64.b64encode(head) + base64.b64encode(body) if packed else base64.b64encode(head + body)
-        attributes = re.sub(rb'offset\s*=\s*"\d+"', b"", found[1]).replace(b'"appended"', b'"binary"')
+        attributes = re.sub(rb'offset\s*=\s*"\d+"', b"", match[1]).replace(b'"appended"', b'"binary"')
         return b"<DataArray" + attributes + b">" + content + b"</DataArray>"
 
     return ARRAY.sub(inline, text) + b"</VTKFile>\n"

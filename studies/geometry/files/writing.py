@@ -24,9 +24,9 @@ TAGS = {"outer": 1, "lumen": 2, "tissue": 3}
 
 def check_target(path: Path, source: Path | None = None) -> None:
     """Raise StudyError unless `path` has a suffix that can be written and is not the file that is read."""
-    known = (*VOLUMES, *SURFACES)
-    if path.suffix.lower() not in known:
-        raise StudyError(f"{path.name}: meshes are written as {', '.join(known)}; choose one of these suffixes")
+    suffixes = (*VOLUMES, *SURFACES)
+    if path.suffix.lower() not in suffixes:
+        raise StudyError(f"{path.name}: meshes are written as {', '.join(suffixes)}; choose one of these suffixes")
     if path.is_dir():
         raise StudyError(f"{path} is a folder; give the name of a file")
     if source is not None and path.exists() and source.exists() and path.samefile(source):

@@ -58,10 +58,10 @@ def divided(
     rows = cells[np.ptp(np.sign(level[cells]), axis=1) > 0]
     rows = np.take_along_axis(rows, np.argsort(-level[rows], axis=1), axis=1)
     count = (level[rows] > 0).sum(axis=1)
-    found, sides = [], []
+    parts, sides = [], []
 
     def add(tetrahedra: np.ndarray, side: int) -> None:
-        found.append(tetrahedra)
+        parts.append(tetrahedra)
         sides.append(np.full(len(tetrahedra), side))
 
     for few in (1, 2, 3):
@@ -79,7 +79,7 @@ def divided(
         else:
             add(_of_wedges(np.stack([a, b, c, at(a, d), at(b, d), at(c, d)], axis=1)), 1)
             add(np.stack([d, at(a, d), at(b, d), at(c, d)], axis=1), -1)
-    tetrahedra = np.concatenate(found)
+    tetrahedra = np.concatenate(parts)
     turned = tetrahedron_volumes(places, tetrahedra) < 0
     tetrahedra[turned] = tetrahedra[turned][:, [0, 2, 1, 3]]
     return tetrahedra, np.concatenate(sides)

@@ -15,9 +15,9 @@ Bring = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
 
 def mend_nodes(
-    points: np.ndarray, tetrahedra: np.ndarray, movable: np.ndarray, bring: Bring, wanted: float
+    points: np.ndarray, tetrahedra: np.ndarray, movable: np.ndarray, bring: Bring, least: float
 ) -> np.ndarray:
-    """Points (n, 3) [m] with movable nodes of tetrahedra below the `wanted` radius ratio moved, worst first.
+    """Points (n, 3) [m] with movable nodes of tetrahedra below the `least` radius ratio moved, worst first.
 
     movable (n,) bool. Each node tries 26 directions at three lengths, is brought back onto its surface, and stays
     where the worst of its tetrahedra is best. No tetrahedron that was better than the worst around it becomes worse
@@ -27,7 +27,7 @@ def mend_nodes(
     trials = trial_moves(REACH)
     for _ in range(ROUNDS):
         ratio = tetrahedron_radius_ratio(points, tetrahedra)
-        bad = np.flatnonzero(ratio < wanted)
+        bad = np.flatnonzero(ratio < least)
         nodes = tetrahedra[bad[np.argsort(ratio[bad], kind="stable")]].ravel()
         nodes = nodes[movable[nodes]]
         nodes = nodes[np.sort(np.unique(nodes, return_index=True)[1])]

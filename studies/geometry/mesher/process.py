@@ -48,7 +48,7 @@ def followed(command: list[str], name: str, limit: float) -> tuple[int, str, str
         killer.start()
         reader.start()
         try:
-            stage = told(lines, name)
+            stage = last_stage(lines, name)
             code = process.wait()
         finally:
             killer.cancel()
@@ -69,7 +69,7 @@ def read_lines(process: subprocess.Popen[str], lines: queue.Queue[str | None]) -
     lines.put(None)
 
 
-def told(lines: queue.Queue[str | None], name: str) -> str:
+def last_stage(lines: queue.Queue[str | None], name: str) -> str:
     """Logs each stage and how long it takes until the last one, which it returns."""
     stage, since = "", time.monotonic()
     while True:

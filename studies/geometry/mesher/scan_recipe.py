@@ -15,11 +15,11 @@ from studies.geometry.mesher.organ_surface import MOST_SPARE
 from studies.geometry.mesher.progress import stage
 from studies.geometry.mesher.worker import Arrays, work
 from studies.geometry.scanned.distance_grid import box_of
-from studies.geometry.scanned.fidelity import TOLD, fidelity
+from studies.geometry.scanned.fidelity import NOTABLE, fidelity
 from studies.geometry.scanned.level_grid import grid_from, shape_of
 from studies.geometry.scanned.scan_shape import COARSEST, Surface, cell_for, faithful, levelled, scan_surface
 from studies.geometry.scanned.shells import solidified
-from studies.geometry.scanned.true_grid import true_grid, wanted_volume
+from studies.geometry.scanned.true_grid import true_grid, target_volume
 from studies.geometry.shape.levelset import Shape
 from studies.geometry.shape.regions import Region, region_from_dict
 from studies.geometry.surface.family import enclosed_volume
@@ -54,8 +54,8 @@ def build_scan(recipe: dict[str, Any], arrays: Arrays) -> Arrays:
         points, triangles = scan_mesh(shape, start, recipe["nodes"], regions, curved=False)
         volume = signed_volume(*source)
         # A second on a fine grid: only where the first triangulation, a little too small, leaves a doubt.
-        if abs(signed_volume(*start) / volume - 1.0) > 0.5 * TOLD:
-            volume = wanted_volume(source, enclosed_volume(shape, 1))
+        if abs(signed_volume(*start) / volume - 1.0) > 0.5 * NOTABLE:
+            volume = target_volume(source, enclosed_volume(shape, 1))
         points = with_volume(points, triangles, volume, shape.level, regions)
     made = finish(replace(shape, wall=recipe.get("wall")), points, triangles, recipe)
     losses = arrays["losses"] if "losses" in arrays else lost(file, body, (points, triangles))

@@ -253,15 +253,15 @@ def loops(edges: np.ndarray) -> list[np.ndarray]:
     for a, b in edges.tolist():
         neighbours.setdefault(a, []).append(b)
         neighbours.setdefault(b, []).append(a)
-    found, left = [], sorted(neighbours)
+    rings, left = [], sorted(neighbours)
     while left:
         loop = [left[0], neighbours[left[0]][0]]
         while loop[-1] != loop[0]:
             one, other = neighbours[loop[-1]]
             loop.append(other if one == loop[-2] else one)
-        found.append(np.array(loop[:-1]))
+        rings.append(np.array(loop[:-1]))
         left = [node for node in left if node not in loop]
-    return found
+    return rings
 
 
 def _straight(start: np.ndarray, end: np.ndarray, step: float) -> np.ndarray:

@@ -14,10 +14,10 @@ from studies.geometry.shape.levelset import Shape
 def make_shape(name: str, parameters: Mapping[str, Any]) -> Shape:
     """The shape `name` of SHAPES with some parameters; raises StudyError for an unknown name, parameter or value."""
     make = lookup(name, SHAPES, "organ")
-    known = inspect.signature(make).parameters
+    signature = inspect.signature(make).parameters
     for parameter, value in parameters.items():
-        lookup(parameter, known, f"parameter of the {name}")
-        none = value is None and known[parameter].default is None
+        lookup(parameter, signature, f"parameter of the {name}")
+        none = value is None and signature[parameter].default is None
         if not none and (isinstance(value, bool) or not isinstance(value, numbers.Real)):
             raise StudyError(f"the {parameter} of the {name} is {value!r}; give a number")
     return make(**parameters)

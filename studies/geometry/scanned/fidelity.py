@@ -10,7 +10,7 @@ from studies.geometry.surface.node_count import handles_of
 
 MOST = 40_000
 """Places of a surface that are measured: more are thinned out evenly."""
-TOLD = 0.02
+NOTABLE = 0.02
 """Largest distance over the diagonal, and change of the volume, beyond which the user is warned."""
 
 Surface = tuple[np.ndarray, np.ndarray]
@@ -65,28 +65,28 @@ def samples(points: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.n
 
 def warnings_of(lost: dict[str, Any]) -> list[str]:
     """Sentences for what a person has to know; none where all is near."""
-    told = []
+    sentences = []
     for key, what in (
         ("file_to_mesh", "this part of the file is missing from the mesh"),
         ("mesh_to_file", "the mesh has a part here that the file does not"),
     ):
         far, place = lost[key]["max"], lost[key]["where"]
-        if far > min(TOLD * lost["diagonal"], lost["edge"]):
+        if far > min(NOTABLE * lost["diagonal"], lost["edge"]):
             where = ", ".join(f"{1e3 * x:.4g}" for x in place)
             share = f"{100 * far / lost['diagonal']:.2g} % of the diagonal"
-            told.append(
+            sentences.append(
                 f"the surface is up to {1e3 * far:.3g} mm off ({share}) at ({where}) mm: {what}; use more nodes, or "
                 "remove it with --smooth"
             )
     if lost["handles"]:
-        told.append(
+        sentences.append(
             f"the body has {lost['handles']} handles or tunnels, as a ring has one; organs have none: close narrow "
             "ones with --smooth"
         )
     change = lost["volume_mesh"] / lost["volume_file"] - 1.0
-    if abs(change) > TOLD:
-        told.append(
+    if abs(change) > NOTABLE:
+        sentences.append(
             f"the volume is {1e6 * lost['volume_mesh']:.4g} mL, that of the file {1e6 * lost['volume_file']:.4g} mL "
             f"({100 * change:+.2g} %)"
         )
-    return told
+    return sentences

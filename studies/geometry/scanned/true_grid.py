@@ -4,7 +4,7 @@ import numpy as np
 
 from studies.geometry.mesh.organ_mesh import signed_volume
 from studies.geometry.scanned.distance_grid import box_of
-from studies.geometry.scanned.fidelity import TOLD
+from studies.geometry.scanned.fidelity import NOTABLE
 from studies.geometry.scanned.level_grid import DistanceGrid, shape_of
 from studies.geometry.scanned.scan_shape import COARSEST, Surface, faithful
 from studies.geometry.surface.family import enclosed_volume
@@ -25,13 +25,13 @@ def true_grid(points: np.ndarray, triangles: np.ndarray, name: str) -> DistanceG
 
 def with_volume_of(surface: Surface, grid: DistanceGrid, start: Surface, name: str) -> DistanceGrid:
     """The grid shifted by a constant, so that its shape has the volume of the surface; start: a triangulation of it."""
-    seen = enclosed_volume(shape_of(grid, name), 1)
+    volume = enclosed_volume(shape_of(grid, name), 1)
     _, area = box_of(*start)
-    return DistanceGrid(grid.low, grid.cell, grid.values - (wanted_volume(surface, seen) - seen) / area)
+    return DistanceGrid(grid.low, grid.cell, grid.values - (target_volume(surface, volume) - volume) / area)
 
 
-def wanted_volume(source: Surface, seen: float) -> float:
-    """Volume [m^3] of the surface of which a shape is a picture; that of the shape, `seen`, where parts of the surface
-    overlap or are lost."""
-    said = signed_volume(*source)
-    return said if abs(seen / said - 1.0) < TOLD else seen
+def target_volume(source: Surface, shape_volume: float) -> float:
+    """Volume [m^3] of the surface of which a shape is a picture; that of the shape, `shape_volume`, where parts
+    of the surface overlap or are lost."""
+    volume = signed_volume(*source)
+    return volume if abs(shape_volume / volume - 1.0) < NOTABLE else shape_volume

@@ -23,9 +23,9 @@ def overlapping_boxes(low: np.ndarray, high: np.ndarray) -> Iterator[np.ndarray]
     while waiting:
         depth, pairs = waiting.pop()
         if depth == len(levels) - 1:
-            found = order[pairs[pairs[:, 0] < pairs[:, 1]]]
-            if len(found):
-                yield np.sort(found, axis=1)
+            overlaps = order[pairs[pairs[:, 0] < pairs[:, 1]]]
+            if len(overlaps):
+                yield np.sort(overlaps, axis=1)
             continue
         pairs = touching(children(pairs), *levels[depth + 1])
         waiting += [(depth + 1, pairs[first : first + AT_ONCE]) for first in range(0, len(pairs), AT_ONCE)]

@@ -25,8 +25,8 @@ def with_node_count(points: np.ndarray, triangles: np.ndarray, nodes: int) -> tu
     return points, triangles
 
 
-def pick_edges(points: np.ndarray, triangles: np.ndarray, wanted: int, split: bool) -> np.ndarray:
-    """Up to `wanted` edges, shape (e, 2), the longest to split or the shortest to collapse, far from each other, that
+def pick_edges(points: np.ndarray, triangles: np.ndarray, most: int, split: bool) -> np.ndarray:
+    """Up to `most` edges, shape (e, 2), the longest to split or the shortest to collapse, far from each other, that
     leave 4 to 7 edges at every node around."""
     edges = unique_edges(triangles)
     valence = np.bincount(edges.ravel(), minlength=len(points))
@@ -36,7 +36,7 @@ def pick_edges(points: np.ndarray, triangles: np.ndarray, wanted: int, split: bo
     touched = np.zeros(len(points), bool)
     picked = []
     for edge in edges[np.argsort(-length if split else length, kind="stable")]:
-        if len(picked) == wanted:
+        if len(picked) == most:
             break
         one, other = (np.unique(triangles[around[start[node] : start[node + 1]]]) for node in edge)
         near = np.union1d(one, other)

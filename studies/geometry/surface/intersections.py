@@ -19,8 +19,8 @@ def crossing_triangles(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     numbers = np.flatnonzero(proper)
     corners = points[triangles[proper]]
     boxes = overlapping_boxes(corners.min(axis=1), corners.max(axis=1))
-    found = [np.empty((0, 2), np.int64), *(crossing(points, triangles[proper], pairs) for pairs in boxes)]
-    pairs = numbers[np.concatenate(found)]
+    crossings = [np.empty((0, 2), np.int64), *(crossing(points, triangles[proper], pairs) for pairs in boxes)]
+    pairs = numbers[np.concatenate(crossings)]
     return pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))]
 
 

@@ -34,7 +34,7 @@ def surface_with(
     if not FEWEST <= nodes <= MOST:
         raise StudyError(f"{shape.name}: {nodes} surface nodes asked for, but the mesher offers {FEWEST} to {MOST}")
     size = 1.06 * np.sqrt(2.0 * area / (np.sqrt(3.0) * nodes))
-    found: list[tuple[float, Surface]] = []
+    candidates: list[tuple[float, Surface]] = []
     for attempt in range(TRIES):
         points, triangles = mesh_at(size)
         miss = abs(len(points) / nodes - 1.0)
@@ -42,17 +42,17 @@ def surface_with(
             edited, triangles = with_node_count(points, triangles, nodes)
             surface = project(shape, edited), triangles
             if is_good(*surface, handles):
-                found.append((miss, surface))
+                candidates.append((miss, surface))
                 if miss <= CLOSE and len(edited) == nodes:
                     break
         # N ~ size^-2; the slight overshoot that alternates keeps the search from standing still on one bad mesh.
         size *= (len(points) / nodes) ** 0.5 * (1.0 + 0.005 * (-1) ** attempt * (attempt // 2))
-    if not found:
+    if not candidates:
         raise StudyError(
             f"{shape.name}: no well-shaped surface with {nodes} nodes in {TRIES} tries; "
             "ask for more nodes, or for a smoother shape"
         )
-    return min(found, key=lambda item: (len(item[1][0]) != nodes, item[0]))[1]
+    return min(candidates, key=lambda item: (len(item[1][0]) != nodes, item[0]))[1]
 
 
 def is_good(points: np.ndarray, triangles: np.ndarray, handles: int = 0) -> bool:

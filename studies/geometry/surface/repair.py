@@ -15,7 +15,7 @@ Surface = tuple[np.ndarray, np.ndarray]
 
 
 @dataclass(frozen=True, eq=False)
-class Mended:
+class RepairedSurface:
     """A repaired surface and what was done to it."""
 
     points: np.ndarray
@@ -24,7 +24,7 @@ class Mended:
     """One sentence for each kind of change, for the person who gave the file."""
 
 
-def mend(points: np.ndarray, triangles: np.ndarray, name: str, holes: bool = False) -> Mended:
+def mend(points: np.ndarray, triangles: np.ndarray, name: str, holes: bool = False) -> RepairedSurface:
     """The largest part of a welded surface, points (n, 3) [m], triangles (t, 3), oriented outward.
 
     Triangles given twice or without three different corners go; parts other than the largest go; triangles are turned
@@ -56,7 +56,7 @@ def mend(points: np.ndarray, triangles: np.ndarray, name: str, holes: bool = Fal
         triangles = triangles[:, ::-1].copy()
         remarks.append("the surface was inverted and has been flipped")
     used, renumbered = np.unique(triangles, return_inverse=True)
-    return Mended(points[used], renumbered.reshape(triangles.shape), tuple(remarks))
+    return RepairedSurface(points[used], renumbered.reshape(triangles.shape), tuple(remarks))
 
 
 def without_repeats(triangles: np.ndarray) -> np.ndarray:

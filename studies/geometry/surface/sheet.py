@@ -83,11 +83,11 @@ def _pieces(points: np.ndarray, triangles: np.ndarray, plane: HalfSpace) -> list
     # Seen from a point of the plane the section adds nothing.
     a, b, c = (points - np.asarray(plane.point))[triangles].transpose(1, 0, 2)
     volume = np.einsum("ij,ij->i", a, np.cross(b, c)) / 6.0
-    found = [(np.unique(triangles[label == k]), float(volume[label == k].sum())) for k in np.unique(label)]
+    pieces = [(np.unique(triangles[label == k]), float(volume[label == k].sum())) for k in np.unique(label)]
     # A dent of the surface is no piece: it is missing in the largest one.
-    dents = sum(volume for _, volume in found if volume <= 0)
-    found = sorted((piece for piece in found if piece[1] > 0), key=lambda piece: -piece[1])
-    return [(nodes, volume + (dents if k == 0 else 0.0)) for k, (nodes, volume) in enumerate(found)]
+    dents = sum(volume for _, volume in pieces if volume <= 0)
+    pieces = sorted((piece for piece in pieces if piece[1] > 0), key=lambda piece: -piece[1])
+    return [(nodes, volume + (dents if k == 0 else 0.0)) for k, (nodes, volume) in enumerate(pieces)]
 
 
 def check_sheet(

@@ -93,9 +93,9 @@ def band_distance_into(corners: np.ndarray, reach: float, scratch: np.ndarray, s
                     height = (i - triangle[0, 0]) * n[0] + (j - triangle[0, 1]) * n[1] + (k - triangle[0, 2]) * n[2]
                     # The plane of a triangle is never farther away than the triangle itself.
                     if height * height <= squared[i, j, k] * square:
-                        found = squared_to_triangle(p, triangle, u, v, n)
-                        if found < squared[i, j, k]:
-                            squared[i, j, k] = found
+                        away = squared_to_triangle(p, triangle, u, v, n)
+                        if away < squared[i, j, k]:
+                            squared[i, j, k] = away
                             owner[i, j, k] = f
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from studies.geometry.scanned.fidelity import TOLD, fidelity, warnings_of
+from studies.geometry.scanned.fidelity import NOTABLE, fidelity, warnings_of
 from tests.geometry.boxes import box, split, together
 
 BALL, FACES = split(*box((-1, -1, -1), (1, 1, 1)), times=4)
@@ -36,4 +36,4 @@ def test_what_is_missing_is_told_with_its_place():
 
 
 def test_nothing_is_told_where_nothing_is_lost():
-    assert warnings_of(fidelity((BALL, FACES), ((1 + TOLD / 10) * BALL, FACES))) == []
+    assert warnings_of(fidelity((BALL, FACES), ((1 + NOTABLE / 10) * BALL, FACES))) == []

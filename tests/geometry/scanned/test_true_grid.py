@@ -7,7 +7,7 @@ from studies.base.errors import StudyError
 from studies.geometry import curved, scan, true_shape_of
 from studies.geometry.files.units import Source
 from studies.geometry.mesh.organ_mesh import signed_volume
-from studies.geometry.scanned.true_grid import true_grid, wanted_volume
+from studies.geometry.scanned.true_grid import true_grid, target_volume
 from studies.geometry.surface.family import enclosed_volume, true_volume
 from tests.geometry.boxes import box, split
 from tests.geometry.files import writers
@@ -64,8 +64,8 @@ def test_two_surfaces_are_two_shapes(egg, tmp_path, mesh_cache):
 
 
 def test_parts_that_overlap_count_once():
-    assert wanted_volume(box(), 0.99) == pytest.approx(1.0)
-    assert wanted_volume(box(), 0.6) == 0.6
+    assert target_volume(box(), 0.99) == pytest.approx(1.0)
+    assert target_volume(box(), 0.6) == 0.6
 
 
 def test_an_open_surface_has_no_shape(egg, tmp_path):
