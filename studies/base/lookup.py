@@ -18,17 +18,17 @@ ALL = {
 
 
 @overload
-def lookup(name: str, known: Mapping[str, T], noun: str) -> T: ...
+def lookup(name: str, items: Mapping[str, T], noun: str) -> T: ...
 @overload
-def lookup(name: str, known: Iterable[str], noun: str) -> str: ...
-def lookup(name, known, noun):
-    """The item of `known` called `name`: its value when `known` is a mapping, the name itself otherwise.
+def lookup(name: str, items: Iterable[str], noun: str) -> str: ...
+def lookup(name, items, noun):
+    """The item of `items` called `name`: its value when `items` is a mapping, the name itself otherwise.
 
     Raises StudyError: "unknown scene 'bal_squeeze'; did you mean 'ball_squeeze' (`organbench list scenes` shows all)?".
     """
-    names = list(known)
+    names = list(items)
     if name in names:
-        return known[name] if isinstance(known, Mapping) else name
+        return items[name] if isinstance(items, Mapping) else name
     raise StudyError(f"unknown {noun} {name!r}; {_answer(name, sorted(set(names)), noun)}")
 
 

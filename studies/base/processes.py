@@ -83,14 +83,14 @@ class Child:
 
         Raises what the job raised."""
         try:
-            heard = pickle.loads(self.line.recv_bytes())
+            answer = pickle.loads(self.line.recv_bytes())
         except (EOFError, ConnectionResetError):
             self.process.join()
             return Died(cause_of(self.process.exitcode))
-        self.busy = isinstance(heard, Message)
-        if isinstance(heard, Exception) and not isinstance(heard, Died):
-            raise heard
-        return heard
+        self.busy = isinstance(answer, Message)
+        if isinstance(answer, Exception) and not isinstance(answer, Died):
+            raise answer
+        return answer
 
     def end(self) -> None:
         """Ends the process, whatever it does: an idle one when its line closes."""
@@ -123,14 +123,14 @@ def run_each(
                 given[child] = waiting.popleft()
                 child.give(do, jobs[given[child]])
             for child in _ready(given):
-                heard = child.hear()
-                if isinstance(heard, Message):
-                    tell(heard.text)
+                answer = child.hear()
+                if isinstance(answer, Message):
+                    tell(answer.text)
                     continue
                 number = given.pop(child)
-                if not isinstance(heard, Died):
+                if not isinstance(answer, Died):
                     idle.append(child)
-                    yield Ended(jobs[number], heard, None)
+                    yield Ended(jobs[number], answer, None)
                     continue
                 child.end()
                 if died_of_it(child.process.exitcode):
@@ -139,7 +139,7 @@ def run_each(
                 if tries[number] < TRIES:
                     waiting.append(number)
                 else:
-                    yield Ended(jobs[number], None, f"its process died {TRIES} times: {heard}")
+                    yield Ended(jobs[number], None, f"its process died {TRIES} times: {answer}")
     finally:
         for child in (*idle, *given):
             child.end()

@@ -16,14 +16,14 @@ def curved_mesh(mesh: OrganMesh, shape: Shape | None = None) -> CurvedMesh:
 
     shape: of a scan, whose recipe does not tell it. Raises StudyError as that does.
     """
-    wanted = curved(mesh, may_fold=True, shape=shape)
-    if wanted.smallest_jacobian > 0.0:
-        return wanted
-    straight = wanted.points.copy()
-    straight[wanted.cells[:, 4:]] = mesh.points[mesh.tetrahedra[:, np.array(PAIRS)]].mean(axis=2)
-    points = moved(straight, wanted.points, wanted.cells, upright_against(straight, wanted.cells), mesh.name)
-    off = np.linalg.norm(points - wanted.points, axis=1)
-    boundary = np.isin(np.arange(len(points)), boundary_facets(mesh, wanted.cells))
+    target = curved(mesh, may_fold=True, shape=shape)
+    if target.smallest_jacobian > 0.0:
+        return target
+    straight = target.points.copy()
+    straight[target.cells[:, 4:]] = mesh.points[mesh.tetrahedra[:, np.array(PAIRS)]].mean(axis=2)
+    points = moved(straight, target.points, target.cells, upright_against(straight, target.cells), mesh.name)
+    off = np.linalg.norm(points - target.points, axis=1)
+    boundary = np.isin(np.arange(len(points)), boundary_facets(mesh, target.cells))
     held = boundary & (off > 0.0)
     if held.any():
         warnings.warn(
@@ -31,7 +31,7 @@ def curved_mesh(mesh: OrganMesh, shape: Shape | None = None) -> CurvedMesh:
             f"{1e3 * off[held].max():.2g} mm off the true shape, or elements would fold; use more nodes",
             stacklevel=2,
         )
-    return replace(wanted, points=points)
+    return replace(target, points=points)
 
 
 def boundary_facets(mesh: OrganMesh, cells: np.ndarray) -> np.ndarray:

@@ -98,30 +98,30 @@ def coarse_level(
     """Surface vertices before halving that end in `nodes` nodes on the outer surface, near `start` where given; `even`:
     of a mesh whose nodes are evenly spread. Raises StudyError."""
     check_number(scene, nodes, quadratic)
-    found: dict[int, int] = {}
+    counts: dict[int, int] = {}
     level, failed = start or max(FEWEST, (nodes + 6) // 4 if quadratic else nodes), None
     for tried in range(MOST_TRIES):
-        if tried >= TRIES and (not found or _off(found, nodes) <= TOLERANCE):
+        if tried >= TRIES and (not counts or _off(counts, nodes) <= TOLERANCE):
             break
         try:
             body = halved(scene, level, at_outlines, at_contact, quadratic, even)[2]
-            found[level] = outer_nodes(body, quadratic)
+            counts[level] = outer_nodes(body, quadratic)
         except StudyError as error:
             failed = failed or error  # raised below, unless a neighbour of this level can be meshed
             level += max(1, level // 50)
             continue
-        off = abs(found[level] / nodes - 1.0)
-        level = max(FEWEST, round(level * nodes / found[level]))
-        if off <= CLOSE or (level in found and _off(found, nodes) <= TOLERANCE):
+        off = abs(counts[level] / nodes - 1.0)
+        level = max(FEWEST, round(level * nodes / counts[level]))
+        if off <= CLOSE or (level in counts and _off(counts, nodes) <= TOLERANCE):
             break
-        if level in found:
-            level = _untried(level, found)
-    if failed is not None and not found:
+        if level in counts:
+            level = _untried(level, counts)
+    if failed is not None and not counts:
         raise failed
-    best = _best(found, nodes)
-    if _off(found, nodes) > TOLERANCE:
+    best = _best(counts, nodes)
+    if _off(counts, nodes) > TOLERANCE:
         raise StudyError(
-            f"scene '{scene.name}': no graded mesh has {nodes} surface nodes; ask for {found[best]}, the nearest found"
+            f"scene '{scene.name}': no graded mesh has {nodes} surface nodes; ask for {counts[best]}, the nearest found"
         )
     return best
 
@@ -135,21 +135,21 @@ def check_number(scene: Scene, nodes: object, quadratic: bool) -> None:
         )
 
 
-def _best(found: dict[int, int], nodes: int) -> int:
+def _best(counts: dict[int, int], nodes: int) -> int:
     """The level whose number of nodes comes nearest."""
-    return min(found, key=lambda tried: abs(found[tried] - nodes))
+    return min(counts, key=lambda tried: abs(counts[tried] - nodes))
 
 
-def _off(found: dict[int, int], nodes: int) -> float:
+def _off(counts: dict[int, int], nodes: int) -> float:
     """Smallest deviation found, over the wanted number."""
-    return abs(found[_best(found, nodes)] / nodes - 1.0)
+    return abs(counts[_best(counts, nodes)] / nodes - 1.0)
 
 
-def _untried(level: int, found: dict[int, int]) -> int:
+def _untried(level: int, counts: dict[int, int]) -> int:
     """The nearest level that was not tried: neighbours end in numbers of nodes that jump."""
     step = max(1, level // 50)
     near = (level + sign * k * step for k in count(1) for sign in (1, -1))
-    return next(other for other in near if other >= FEWEST and other not in found)
+    return next(other for other in near if other >= FEWEST and other not in counts)
 
 
 def outer_nodes(body: HeldMesh, quadratic: bool) -> int:

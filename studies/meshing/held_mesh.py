@@ -44,7 +44,7 @@ class HeldMesh:
     def faces_of_cuts(self) -> list[np.ndarray]:
         """The faces of this mesh that are parts of each cut, seen from in front of it, (f, 3)."""
         x, reach = self.mesh.p.T, SAME_POINT * float(np.ptp(self.corners))
-        found = []
+        by_cut = []
         for cut in self.cuts:
             inner = np.asarray(self.mesh.f2t)[1] >= 0
             faces = np.asarray(self.mesh.facets).T[inner].astype(np.int64)
@@ -52,8 +52,8 @@ class HeldMesh:
             normals = triangle_normals(x, faces)
             # A sheet is flat: faces that stand across it have their middle beside it.
             normal = triangle_normals(self.corners, cut[:1])[0]
-            found.append(np.where((normals @ normal < 0)[:, None], faces[:, ::-1], faces))
-        return found
+            by_cut.append(np.where((normals @ normal < 0)[:, None], faces[:, ::-1], faces))
+        return by_cut
 
     @property
     def cut_faces(self) -> np.ndarray:

@@ -32,13 +32,13 @@ def tell_shape(scene: Scene, mesh: OrganMesh | QuadraticMesh, filled: bool) -> N
     is in it; otherwise it is the outer surface.
 
     Raises StudyError for one that holds far too little or too much of a held region."""
-    found = []
+    faults = []
     # The triangles of a file that come as they are have its shape.
     if remeshed(scene.organ):
         facets = mesh.facets if isinstance(mesh, QuadraticMesh) else mesh.triangles if filled else mesh.outer_triangles
         errors = shape_errors(scene.organ, rest_surfaces(mesh.points, facets), filled)
         if errors.worst > 1.0:
-            found.append(str(errors))
+            faults.append(str(errors))
     for held in scene.held:
         off = 100.0 * held_area_error(scene, mesh, held)
         if abs(off) > REFUSED_AREA and remeshed(scene.organ):
@@ -47,11 +47,11 @@ def tell_shape(scene: Scene, mesh: OrganMesh | QuadraticMesh, filled: bool) -> N
                 f"(allowed: {REFUSED_AREA:g} %); use more nodes"
             )
         if abs(off) > HELD_AREA:
-            found.append(f"area of the held region '{held.name}' {off:+.2g} %")
-    if found:
+            faults.append(f"area of the held region '{held.name}' {off:+.2g} %")
+    if faults:
         flat = "" if isinstance(mesh, QuadraticMesh) else ", or quadratic elements, whose sides follow the surface"
         what = f"{mesh.name}: the body at rest does not keep the shape of its organ"
-        warnings.warn(f"{what}: {', '.join(found)}; use more nodes{flat}", stacklevel=2)
+        warnings.warn(f"{what}: {', '.join(faults)}; use more nodes{flat}", stacklevel=2)
     few = touched_facets(scene, mesh)
     if scene.held and few is not None and few < FACETS:
         warnings.warn(
@@ -93,18 +93,18 @@ def area_error(organ: Organ, held: Held, points: np.ndarray, facets: np.ndarray)
 def level_that_holds(level: int, most: int, lost: Callable[[int], float], bound: float) -> int:
     """Of the levels from `level` on, each finer by FINER, up to `most` the first that has at most `bound` `lost`; where
     none has, the one with the least. Raises StudyError, the first one, where none can be meshed."""
-    found, failed = list[tuple[float, int]](), list[StudyError]()
-    while level <= most or not (found or failed):
+    losses, failed = list[tuple[float, int]](), list[StudyError]()
+    while level <= most or not (losses or failed):
         try:
-            found.append((lost(level), level))
-            if found[-1][0] <= bound:
+            losses.append((lost(level), level))
+            if losses[-1][0] <= bound:
                 return level
         except StudyError as error:  # a neighbour of this level may be meshed
             failed.append(error)
         level = max(level + 1, round(FINER * level))
-    if not found:
+    if not losses:
         raise failed[0]
-    return min(found)[1]
+    return min(losses)[1]
 
 
 def held_facets(mesh: OrganMesh | QuadraticMesh, held: Held) -> np.ndarray:

@@ -66,8 +66,8 @@ class NestedMesh:
         flat = MeshTet2.from_mesh(self.body.mesh)
         *held, _ = self.body.facets(flat)
         outlines = np.concatenate([*(rim_sides(facets)[:, :2].ravel() for facets in held), self.body.front]).astype(int)
-        wanted = drawn_middles(self.points, flat, outlines, SHARE)
-        points, _ = upright(self.points, wanted, element_nodes(flat), LEAST)
+        target = drawn_middles(self.points, flat, outlines, SHARE)
+        points, _ = upright(self.points, target, element_nodes(flat), LEAST)
         return replace(flat, doflocs=np.ascontiguousarray(points.T))
 
     @cached_property
@@ -218,13 +218,13 @@ def marked(body: HeldMesh, indicator: np.ndarray, elements: int, least: float = 
     return body, parents
 
 
-def upright(safe: np.ndarray, wanted: np.ndarray, cells: np.ndarray, least: float) -> tuple[np.ndarray, np.ndarray]:
-    """`wanted` (n, 3) [m] with the nodes of elements (k, 10) back at `safe` whose smallest Jacobian would be below
+def upright(safe: np.ndarray, target: np.ndarray, cells: np.ndarray, least: float) -> tuple[np.ndarray, np.ndarray]:
+    """`target` (n, 3) [m] with the nodes of elements (k, 10) back at `safe` whose smallest Jacobian would be below
     `least` and is not at `safe`; and which nodes those are."""
     back = np.zeros(len(safe), dtype=bool)
-    moved = (wanted != safe).any(axis=1)
+    moved = (target != safe).any(axis=1)
     while True:
-        x = np.where(back[:, None], safe, wanted)
+        x = np.where(back[:, None], safe, target)
         folded = np.flatnonzero(smallest_jacobian(x, cells) < least)
         new = np.zeros_like(back)
         new[cells[folded]] = True

@@ -129,9 +129,9 @@ def _slopes(local: np.ndarray, curved: bool) -> np.ndarray:
 
 
 def _nearest(
-    queries: np.ndarray, corners: np.ndarray, tree: KDTree, wanted: np.ndarray
+    queries: np.ndarray, corners: np.ndarray, tree: KDTree, distance: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Which of the triangles (t, 3, 3), with a tree of their centroids, is at the distance `wanted` (q,) [m] from each
+    """Which of the triangles (t, 3, 3), with a tree of their centroids, is at the `distance` (q,) [m] from each
     of `queries` (q, 3), and where in it (q, 3)."""
     triangle, inside = np.empty(len(queries), np.int64), np.empty((len(queries), 3))
     pending, count = np.arange(len(queries)), min(CANDIDATES, len(corners))
@@ -143,7 +143,7 @@ def _nearest(
         triangle[pending], inside[pending] = near[row, best], local[row, best]
         if count == len(corners):
             break
-        pending = pending[np.sqrt(square[row, best]) > wanted[pending] + allowed]
+        pending = pending[np.sqrt(square[row, best]) > distance[pending] + allowed]
         count = min(2 * count, len(corners))
     return triangle, inside
 

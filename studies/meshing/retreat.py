@@ -16,8 +16,8 @@ Measure = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]
 rest, at most 0 for one inside out."""
 
 
-def retreat(safe: np.ndarray, wanted: np.ndarray, cells: np.ndarray, measure: Measure, name: str) -> np.ndarray:
-    """Share of the way from `safe` to `wanted` (n, 3) [m] that each node can go, (n,).
+def retreat(safe: np.ndarray, target: np.ndarray, cells: np.ndarray, measure: Measure, name: str) -> np.ndarray:
+    """Share of the way from `safe` to `target` (n, 3) [m] that each node can go, (n,).
 
     While an element of `cells` (k, m) is below FLOOR, or below what it is at `safe` if that is less, one of its nodes
     takes a step back: the one that helps the elements around it most, or all where none helps. Raises StudyError for an
@@ -30,7 +30,7 @@ def retreat(safe: np.ndarray, wanted: np.ndarray, cells: np.ndarray, measure: Me
         place = ", ".join(f"{1e3 * x:.1f}" for x in safe[cells[worst]].mean(axis=0))
         raise StudyError(f"{name}: the element at ({place}) mm is flat or inverted; use more nodes, or mesh again")
     floor = np.minimum(FLOOR, (1.0 - 1e-9) * at_rest)
-    way, share = wanted - safe, np.ones(len(safe))
+    way, share = target - safe, np.ones(len(safe))
     while True:
         points = safe + share[:, None] * way
         low = np.flatnonzero(measure(points, cells, every) < floor)

@@ -127,12 +127,12 @@ def with_middles(vertices: np.ndarray, body: HeldMesh) -> np.ndarray:
     return np.concatenate([vertices, vertices[body.mesh.edges].mean(axis=0)])
 
 
-def moved_vertices(safe: np.ndarray, wanted: np.ndarray, cells: np.ndarray, name: str) -> np.ndarray:
-    """Vertices as far on the way from `safe` to `wanted` (v, 3) [m] as leaves no tetrahedron (k, 4) much flatter.
+def moved_vertices(safe: np.ndarray, target: np.ndarray, cells: np.ndarray, name: str) -> np.ndarray:
+    """Vertices as far on the way from `safe` to `target` (v, 3) [m] as leaves no tetrahedron (k, 4) much flatter.
 
     Raises StudyError."""
     before = tetrahedron_radius_ratio(safe, cells)
-    return moved(safe, wanted, cells, lambda x, some, which: tetrahedron_radius_ratio(x, some) / before[which], name)
+    return moved(safe, target, cells, lambda x, some, which: tetrahedron_radius_ratio(x, some) / before[which], name)
 
 
 def laid_out(scene: Scene, organ_mesh: OrganMesh, coarse: HeldMesh, fine: HeldMesh, shape: Shape) -> np.ndarray:
@@ -151,11 +151,11 @@ def upright_against(points: np.ndarray, cells: np.ndarray) -> Measure:
     return lambda x, some, which: uprightness(x, some, volume[which])
 
 
-def moved(safe: np.ndarray, wanted: np.ndarray, cells: np.ndarray, measure: Measure, name: str) -> np.ndarray:
-    """Points (n, 3) [m] as far on the way from `safe` to `wanted` as keeps the elements upright. Raises StudyError."""
-    share = retreat(safe, wanted, cells, measure, name)[:, None]
-    # Exact where nothing is held back: safe + (wanted - safe) would be rounded.
-    return np.where(share == 1.0, wanted, safe + share * (wanted - safe))
+def moved(safe: np.ndarray, target: np.ndarray, cells: np.ndarray, measure: Measure, name: str) -> np.ndarray:
+    """Points (n, 3) [m] as far on the way from `safe` to `target` as keeps the elements upright. Raises StudyError."""
+    share = retreat(safe, target, cells, measure, name)[:, None]
+    # Exact where nothing is held back: safe + (target - safe) would be rounded.
+    return np.where(share == 1.0, target, safe + share * (target - safe))
 
 
 def tell(name: str, points: np.ndarray, aim: np.ndarray) -> None:

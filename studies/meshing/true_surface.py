@@ -119,11 +119,11 @@ def _of_file(organ: Organ) -> TrueSurface:
 
 def _of_shape(shape: Shape, scan: bool) -> TrueSurface:
     shapes = {OUTER: shape} if shape.wall is None else {OUTER: shape, LUMEN: at_depth(shape, shape.wall)}
-    found = {name: _fine(each, scan) for name, each in shapes.items()}
+    sides = {name: _fine(each, scan) for name, each in shapes.items()}
     signs = {OUTER: 1.0, LUMEN: -1.0}
     return TrueSurface(
-        {name: surface for name, (surface, _) in found.items()},
-        {name: signs[name] * volume for name, (_, volume) in found.items()},
+        {name: surface for name, (surface, _) in sides.items()},
+        {name: signs[name] * volume for name, (_, volume) in sides.items()},
     )
 
 

@@ -47,8 +47,8 @@ STEP = 1.25
 """Factor by which the number of elements grows until there are enough surface nodes."""
 
 
-def adaptive_mesh(scene: Scene, wanted: int) -> QuadraticMesh:
-    """The scene's organ in quadratic tetrahedra with `wanted` nodes on its outer surface or a few more, mid-side nodes
+def adaptive_mesh(scene: Scene, number: int) -> QuadraticMesh:
+    """The scene's organ in quadratic tetrahedra with `number` nodes on its outer surface or a few more, mid-side nodes
     among them: of a mesh with a share of them, elements are halved, those with the largest error indicator first.
 
     A mesh file that comes as it is has its own coarse mesh. The wall of a hollow organ has one layer.
@@ -58,10 +58,10 @@ def adaptive_mesh(scene: Scene, wanted: int) -> QuadraticMesh:
     reason = why_not(scene)
     if reason is not None:
         raise StudyError(f"scene '{scene.name}' has no adaptive bodies: {reason}; choose graded=True")
-    check_number(scene, wanted, quadratic=True)
-    organ_mesh, coarse = coarse_mesh(scene, wanted)
+    check_number(scene, number, quadratic=True)
+    organ_mesh, coarse = coarse_mesh(scene, number)
     few = outer_nodes(coarse, quadratic=True)
-    if few > wanted:
+    if few > number:
         raise StudyError(f"scene '{scene.name}': its coarse mesh has {few} surface nodes already; ask for more")
     recipe = {
         "kind": "indicator",
@@ -71,20 +71,20 @@ def adaptive_mesh(scene: Scene, wanted: int) -> QuadraticMesh:
     }
     shape = {"points": organ_mesh.points, "tetrahedra": organ_mesh.tetrahedra}
     names = "indicator", "stretch"
-    found = cached(
+    arrays = cached(
         recipe, shape, names, lambda: dict(zip(names, indicators_of(scene, organ_mesh, coarse), strict=True))
     )
-    fine = adapted(coarse, found["indicator"], wanted, least_edge(coarse, found["stretch"]))
+    fine = adapted(coarse, arrays["indicator"], number, least_edge(coarse, arrays["stretch"]))
     return quadratic_mesh(scene, organ_mesh, coarse, fine, middles(scene))
 
 
-def coarse_mesh(scene: Scene, wanted: int) -> tuple[OrganMesh, HeldMesh]:
-    """The organ's mesh with a share of the `wanted` nodes on its outer surface, mid-side nodes among them, or a larger
+def coarse_mesh(scene: Scene, number: int) -> tuple[OrganMesh, HeldMesh]:
+    """The organ's mesh with a share of `number` nodes on its outer surface, mid-side nodes among them, or a larger
     share where that loses area of a held region; the best where all do."""
     share = HOLLOW if is_hollow(scene) else SOLID
-    level = max(FEWEST, round((share * wanted + 6) / 4))
+    level = max(FEWEST, round((share * number + 6) / 4))
     if remeshed(scene.organ):
-        most = int((MOST * wanted + 6) / 4)
+        most = int((MOST * number + 6) / 4)
         level = level_that_holds(level, most, lambda tried: lost_area(scene, tried), HELD_AREA)
     organ_mesh, coarse, _ = halved(scene, level, 0, 0)
     return organ_mesh, coarse
@@ -144,20 +144,20 @@ def least_edge(coarse: HeldMesh, stretch: np.ndarray) -> float:
     return float((edge * ((stretch[there] - 1.0) / STRAIN) ** 2).max(initial=0.0))
 
 
-def adapted(coarse: HeldMesh, indicator: np.ndarray, wanted: int, least: float = 0.0) -> HeldMesh:
-    """`coarse` with elements halved, largest indicator (ne,) first, until there are `wanted` nodes on the outer
+def adapted(coarse: HeldMesh, indicator: np.ndarray, number: int, least: float = 0.0) -> HeldMesh:
+    """`coarse` with elements halved, largest indicator (ne,) first, until there are `number` nodes on the outer
     surface; at outlines none to edges shorter than `least` [m]."""
     few, many, body = 0, coarse.mesh.nelements, coarse
-    while outer_nodes(body, quadratic=True) < wanted:
+    while outer_nodes(body, quadratic=True) < number:
         few, many = many, round(STEP * many)
         body = marked(coarse, indicator, many, least)[0]
         if body.mesh.nelements <= few:
-            raise StudyError(f"no element is left to halve, and the mesh has fewer than {wanted} nodes; ask for fewer")
+            raise StudyError(f"no element is left to halve, and the mesh has fewer than {number} nodes; ask for fewer")
     # The fewest elements that do, within one in a hundred.
     while few and many - few > max(1, many // 100):
         middle = (few + many) // 2
         tried = marked(coarse, indicator, middle, least)[0]
-        if outer_nodes(tried, quadratic=True) < wanted:
+        if outer_nodes(tried, quadratic=True) < number:
             few = middle
         else:
             many, body = middle, tried

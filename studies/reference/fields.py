@@ -14,7 +14,7 @@ from studies.store.schema import REFERENCE_FIELDS
 
 def fields_of(scene: Scene, solution: FamilySolution) -> dict[str, Field]:
     """The equilibria at the checkpoints, one row each, NaN where the path did not get there; and the samples."""
-    problem, found = solution.problem, solution.equilibria
+    problem, equilibria = solution.problem, solution.equilibria
     x, tetrahedra = nodes(problem.mesh), problem.mesh.t.T.astype(np.int64)
     lengths = {"K": len(scene.checkpoints), "o": len(scene.obstacles), "g": len(problem.held), "n": len(x)}
 
@@ -35,7 +35,7 @@ def fields_of(scene: Scene, solution: FamilySolution) -> dict[str, Field]:
             "displacement": e.u,
         }
 
-    rows = [row(e) for e in found]
+    rows = [row(e) for e in equilibria]
     values = {"t": np.array(scene.checkpoints), "nodes": x, "tetrahedra": tetrahedra}
     values |= sample_fields(solution.at, solution.samples, len(scene.checkpoints))
     for name in REFERENCE_FIELDS.keys() - values.keys():

@@ -63,11 +63,11 @@ class MeshSolution(NamedTuple):
     @property
     def equilibria(self) -> list[Equilibrium]:
         """At every checkpoint, by the nodes of the mesh that is solved last."""
-        found = list[Equilibrium]()
+        equilibria = list[Equilibrium]()
         for system, states in self.parts:
             here = [describe(system, state, state.iterations, 1) for state in states]
-            found += in_last_mesh(self.mesh, system.problem, here)
-        return found
+            equilibria += in_last_mesh(self.mesh, system.problem, here)
+        return equilibria
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,15 +141,15 @@ def path_of(
 ) -> list[Equilibrium]:
     """Equilibria of problems on one of the nested meshes, one after the other, by the nodes of the last; with a setting
     made `better`. Raises SolveError with what was reached."""
-    found = list[Equilibrium]()
+    equilibria = list[Equilibrium]()
     for one in work:
         try:
             path = equilibrium_path(*(one if better is None else better(*one)), on_checkpoint=on_checkpoint)
         except SolveError as error:
             reached = in_last_mesh(mesh, one[0], error.converged)
-            raise SolveError(str(error), converged=[*found, *reached]) from error
-        found += in_last_mesh(mesh, one[0], [e for e in path if e.t in one[1]])
-    return found
+            raise SolveError(str(error), converged=[*equilibria, *reached]) from error
+        equilibria += in_last_mesh(mesh, one[0], [e for e in path if e.t in one[1]])
+    return equilibria
 
 
 def problem_of(mesh: NestedMesh) -> Problem:
@@ -175,14 +175,14 @@ def problems_of(mesh: NestedMesh) -> list[Work]:
     return work
 
 
-def in_last_mesh(mesh: NestedMesh, problem: Problem, found: Sequence[Equilibrium]) -> list[Equilibrium]:
+def in_last_mesh(mesh: NestedMesh, problem: Problem, equilibria: Sequence[Equilibrium]) -> list[Equilibrium]:
     """Equilibria of one of its problems by the nodes of the mesh that is solved last: copies of a node are together
     until a cut parts them."""
     if problem.mesh is mesh.solved:
-        return list(found)
+        return list(equilibria)
     node = parents(element_nodes(problem.mesh), element_nodes(mesh.solved))
     vertices = node[: mesh.solved.nvertices]
-    return [replace(one, u=one.u[node], p=one.p[vertices]) for one in found]
+    return [replace(one, u=one.u[node], p=one.p[vertices]) for one in equilibria]
 
 
 def targets(first: int, most: float) -> list[float]:

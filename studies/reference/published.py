@@ -71,8 +71,8 @@ def index(folder: Path = FOLDER) -> Mapping[str, Entry]:
     try:
         data = json.loads((folder / INDEX).read_text(encoding="utf-8"))
         listed = [
-            (scene, known["physics"], Entry(data["set"], folder / known["file"], known["sha256"]))
-            for scene, known in data["references"].items()
+            (scene, row["physics"], Entry(data["set"], folder / row["file"], row["sha256"]))
+            for scene, row in data["references"].items()
         ]
     except (OSError, ValueError, LookupError, TypeError, AttributeError) as error:
         warnings.warn(
@@ -97,8 +97,8 @@ def fault_of(entry: Entry) -> str | None:
     """What is wrong with the file; None where it is as it was published."""
     if not entry.file.is_file():
         return "is missing"
-    found = hashlib.sha256(entry.file.read_bytes()).hexdigest()
-    return None if found == entry.sha256 else "is damaged"
+    digest = hashlib.sha256(entry.file.read_bytes()).hexdigest()
+    return None if digest == entry.sha256 else "is damaged"
 
 
 def fingerprint_of(scene: Scene) -> str:

@@ -37,12 +37,12 @@ def fitted_frequency(t: np.ndarray, swing: np.ndarray, damping: float) -> float:
 
     def left(f: float) -> float:
         basis = np.stack([np.ones_like(t), fade * np.cos(2 * np.pi * f * t), fade * np.sin(2 * np.pi * f * t)], axis=1)
-        found = np.linalg.lstsq(basis, swing, rcond=None)[0]
-        return float(np.sum((basis @ found - swing) ** 2))
+        coefficients = np.linalg.lstsq(basis, swing, rcond=None)[0]
+        return float(np.sum((basis @ coefficients - swing) ** 2))
 
     span = float(t[-1] - t[0])
     trials = np.linspace(0.5 / span, 0.25 * (len(t) - 1) / span, TRIALS)
     best = int(np.argmin([left(f) for f in trials]))
     bounds = trials[max(best - 1, 0)], trials[min(best + 1, TRIALS - 1)]
-    found = minimize_scalar(left, bounds=bounds, method="bounded", options={"xatol": 1e-9 * trials[best]})
-    return float(found.x)  # pyright: ignore[reportAttributeAccessIssue]
+    minimum = minimize_scalar(left, bounds=bounds, method="bounded", options={"xatol": 1e-9 * trials[best]})
+    return float(minimum.x)  # pyright: ignore[reportAttributeAccessIssue]

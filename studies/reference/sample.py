@@ -88,30 +88,30 @@ class Sample:
 
 
 def sample_of(
-    scene: Scene, problem: Problem, found: Sequence[Equilibrium], at: SamplePoints, size: float, variant: str = ""
+    scene: Scene, problem: Problem, equilibria: Sequence[Equilibrium], at: SamplePoints, size: float, variant: str = ""
 ) -> Sample:
     """The sample of equilibria, the last ones of the scene's checkpoints or all of them."""
     series = {name: np.full(len(scene.checkpoints), np.nan) for name in SERIES}
     if allowed(scene, "force"):
-        forces = whole_forces(scene, np.array([e.obstacle_force for e in found]))
-        series["force"][-len(found) :] = scene.output_force(forces, np.array([e.held_force for e in found]))
-    series["volume"][-len(found) :] = [e.volume / e.volume0 for e in found]
-    series["pressure"][-len(found) :] = [mean_pressure(problem, e) for e in found]
+        forces = whole_forces(scene, np.array([e.obstacle_force for e in equilibria]))
+        series["force"][-len(equilibria) :] = scene.output_force(forces, np.array([e.held_force for e in equilibria]))
+    series["volume"][-len(equilibria) :] = [e.volume / e.volume0 for e in equilibria]
+    series["pressure"][-len(equilibria) :] = [mean_pressure(problem, e) for e in equilibria]
     if scene.filled:
-        series["lumen_pressure"][-len(found) :] = [float(e.cavity_pressure.sum()) for e in found]
+        series["lumen_pressure"][-len(equilibria) :] = [float(e.cavity_pressure.sum()) for e in equilibria]
     # Vertices come first in all meshes of a family; a place on a cut has two sides, and only numbers tell them apart.
     if scene.cuts or np.array_equal(nodes(problem.mesh)[: len(at.points)], at.points):
-        moved = np.array([e.u[: len(at.points)] for e in found])
+        moved = np.array([e.u[: len(at.points)] for e in equilibria])
     else:
-        columns = np.concatenate([e.u for e in found], axis=1)  # one field of 3 k components
+        columns = np.concatenate([e.u for e in equilibria], axis=1)  # one field of 3 k components
         moved = Evaluator(problem.mesh).displacement(columns, at.points)
-        moved = moved.reshape(len(at.points), len(found), 3).transpose(1, 0, 2)
+        moved = moved.reshape(len(at.points), len(equilibria), 3).transpose(1, 0, 2)
     frequency = float("nan")
-    if allowed(scene, "frequency") and len(found) == len(scene.checkpoints):
+    if allowed(scene, "frequency") and len(equilibria) == len(scene.checkpoints):
         frequency = ringing_frequency(scene, np.array(scene.checkpoints), at.points, moved, at.areas)
     unknowns = 3 * len(nodes(problem.mesh)) + problem.mesh.nvertices
     behind, front = parted(problem.mesh.p.T, len(at.points)).T if scene.cuts else NO_PAIRS.T
-    opening = found[-1].u[front] - found[-1].u[behind]
+    opening = equilibria[-1].u[front] - equilibria[-1].u[behind]
     return Sample(variant, unknowns, size, moved[-1], **series, frequency=frequency, opening=opening)
 
 

@@ -141,10 +141,10 @@ class Solution:
     def _evaluator(self, among: np.ndarray | None) -> Evaluator:
         part = b"" if among is None else among.tobytes()
         key = self.field("nodes").tobytes(), self.field("tetrahedra").tobytes(), part
-        found = _EVALUATORS.get(key)
-        if found is None:
-            found = _EVALUATORS[key] = _Remembering(self.mesh, among)
-        return found
+        evaluator = _EVALUATORS.get(key)
+        if evaluator is None:
+            evaluator = _EVALUATORS[key] = _Remembering(self.mesh, among)
+        return evaluator
 
     @cached_property
     def triangles(self) -> np.ndarray:
@@ -177,12 +177,12 @@ class Solution:
         count, nodes, _ = nodal.shape
         # One field of 3 k components: the evaluator takes any number of them.
         columns = nodal.transpose(1, 0, 2).reshape(nodes, 3 * count)
-        found, side = np.empty((len(points), 3 * count)), sides_of(self.scene.cuts, points)
+        values, side = np.empty((len(points), 3 * count)), sides_of(self.scene.cuts, points)
         for one in np.unique(side):
             # Where no element is, planes meet outside of the body.
             evaluator = self._evaluators.get(int(one)) or self._evaluator(None)
-            found[side == one] = evaluator.displacement(columns, (sign * points)[side == one])
-        return sign * found.reshape(len(points), count, 3).transpose(1, 0, 2)
+            values[side == one] = evaluator.displacement(columns, (sign * points)[side == one])
+        return sign * values.reshape(len(points), count, 3).transpose(1, 0, 2)
 
     def outside(self, triangles: np.ndarray) -> np.ndarray:
         """Those of the boundary triangles or facets (s, 3 or 6) that do not lie in a plane of symmetry."""

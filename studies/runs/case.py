@@ -263,7 +263,7 @@ def _unread(given: Any, understood: Any, where: str = "") -> list[str]:
         ]
     if isinstance(given, list) and isinstance(understood, list):
         pairs = enumerate(zip(given, understood, strict=False))
-        return [u for number, (g, known) in pairs for u in _unread(g, known, f"{where}[{number}]")]
+        return [u for number, (g, counterpart) in pairs for u in _unread(g, counterpart, f"{where}[{number}]")]
     return []
 
 

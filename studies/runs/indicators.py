@@ -31,19 +31,21 @@ def indicators(scene: Scene, body: Body, history: History, lumen: int) -> dict[s
     }
 
 
-def remarks(found: dict[str, float]) -> list[str]:
+def remarks(signs: dict[str, float]) -> list[str]:
     """A sentence for each indicator that is beyond its bound."""
-    said = []
-    if found["unknowns_per_volume"] < LOCKS:
-        each = found["unknowns_per_volume"]
-        said.append(f"there are {each:.2g} unknowns for each kept volume; below {LOCKS:g} a body locks, keep fewer")
-    if found["alternation"] > ALTERNATES:
-        part = found["alternation"]
-        said.append(f"pressures alternate by {part:.2g} of the shear modulus between neighbouring volumes; smooth them")
-    if found["sway"] > SWAYS:
-        percent = 100 * found["sway"]
-        said.append(f"the force oscillates by {percent:.2g} % at the end while nothing outside moves; halve the step")
-    return said
+    lines = []
+    if signs["unknowns_per_volume"] < LOCKS:
+        each = signs["unknowns_per_volume"]
+        lines.append(f"there are {each:.2g} unknowns for each kept volume; below {LOCKS:g} a body locks, keep fewer")
+    if signs["alternation"] > ALTERNATES:
+        part = signs["alternation"]
+        lines.append(
+            f"pressures alternate by {part:.2g} of the shear modulus between neighbouring volumes; smooth them"
+        )
+    if signs["sway"] > SWAYS:
+        percent = 100 * signs["sway"]
+        lines.append(f"the force oscillates by {percent:.2g} % at the end while nothing outside moves; halve the step")
+    return lines
 
 
 def neighbours(kept: Volumes | PointVolumes, lumen: int) -> np.ndarray:

@@ -55,22 +55,22 @@ def measure(case: Case, on_frame: Callable[[int], object] | None = None) -> Reco
             extra = [name for name in case.recorded if name in EXTRA]
             history = simulate(prepared.setup, snapshot_frames(case, prepared), on_frame, TIME_LIMIT, extra)
         except DoesNotApply as reason:
-            return _record(case, Status.SKIPPED, str(reason), {"warnings": _said(caught)}, {})
+            return _record(case, Status.SKIPPED, str(reason), {"warnings": _warning_text(caught)}, {})
         except (StudyError, MassSpringError) as error:
-            return _record(case, Status.FAILED, str(error), {"warnings": _said(caught)}, {})
+            return _record(case, Status.FAILED, str(error), {"warnings": _warning_text(caught)}, {})
         except Exception as error:  # code of a user may fail in any way
             own = fault_of(error)
             if own is None:
                 raise
-            return _record(case, Status.FAILED, own, {"warnings": _said(caught)}, {})
+            return _record(case, Status.FAILED, own, {"warnings": _warning_text(caught)}, {})
     status, message = judge(case, prepared, history)
-    found = indicators(case.scene, prepared.body, history, _lumen_column(prepared))
-    said = "; ".join(filter(None, [_said(caught), *remarks(found)]))
-    attributes = {**_attributes(prepared, history), **found, "warnings": said}
+    signs = indicators(case.scene, prepared.body, history, _lumen_column(prepared))
+    text = "; ".join(filter(None, [_warning_text(caught), *remarks(signs)]))
+    attributes = {**_attributes(prepared, history), **signs, "warnings": text}
     return _record(case, status, message, attributes, _fields(case, prepared, history))
 
 
-def _said(caught: list[warnings.WarningMessage]) -> str:
+def _warning_text(caught: list[warnings.WarningMessage]) -> str:
     return "; ".join(dict.fromkeys(str(w.message) for w in caught if issubclass(w.category, UserWarning)))
 
 
@@ -144,14 +144,14 @@ def _event_attributes(prepared: Prepared, history: History) -> dict[str, float]:
     """What a cut did, at the worst of its events; of a run that ended before it what it would do to the step alone."""
     before = prepared.limit_before
     assert before is not None  # it is cut
-    found = {"cut_limit_ratio": prepared.limit.damped / before.damped, "cut_events": len(prepared.setup.events)}
+    attributes = {"cut_limit_ratio": prepared.limit.damped / before.damped, "cut_events": len(prepared.setup.events)}
     if history.passages:
-        found |= {
+        attributes |= {
             "cut_energy": max(one.energy for one in history.passages),
             "cut_momentum": max(one.momentum for one in history.passages),
             "cut_seconds": 1e-9 * max(one.ns for one in history.passages),
         }
-    return found
+    return attributes
 
 
 def _lumen_column(prepared: Prepared) -> int:

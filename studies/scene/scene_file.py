@@ -82,7 +82,7 @@ class Recommended:
 
 
 def scene_text(
-    found: Proposal,
+    proposal: Proposal,
     organ: Mapping[str, object],
     tissue: str,
     nodes: int,
@@ -96,17 +96,17 @@ def scene_text(
     path = Path(str(organ["path"]))
     given = {key: json.dumps(value) if isinstance(value, str) else repr(value) for key, value in organ.items()}
     entries = ", ".join(f'"{key}": {text}' for key, text in (given | {"path": "str(FILE)"}).items())
-    radius, depth = (round(share * found.sides[0], 4) for share in (RADIUS, DEPTH))
+    radius, depth = (round(share * proposal.sides[0], 4) for share in (RADIUS, DEPTH))
     second = ""
     if recommended is not None:
         names = " and ".join(recommended.alike)
         second = RECOMMENDED.format(body=recommended.body, dt_fraction=recommended.dt_fraction, alike=names)
     return TEXT.format(
         name=python_name(stem_of(path)),
-        where=found.held_where,
+        where=proposal.held_where,
         file=relative(path, folder),
-        point=found.palpation.point,
-        normal=found.palpation.normal,
+        point=proposal.palpation.point,
+        normal=proposal.palpation.normal,
         radius=radius,
         depth=depth,
         gap=GAP,
@@ -114,8 +114,10 @@ def scene_text(
         depth_mm=1e3 * depth,
         organ=entries,
         tissue=tissue.upper(),
-        region=type(found.hold).__name__,
-        hold=", ".join(str(value) for value in vars(found.hold).values()).join((f"{type(found.hold).__name__}(", ")")),
+        region=type(proposal.hold).__name__,
+        hold=", ".join(str(value) for value in vars(proposal.hold).values()).join(
+            (f"{type(proposal.hold).__name__}(", ")")
+        ),
         nodes=nodes,
         recommended=second,
     )

@@ -19,7 +19,7 @@ from studies.geometry.scanned.fidelity import NOTABLE, fidelity
 from studies.geometry.scanned.level_grid import grid_from, shape_of
 from studies.geometry.scanned.scan_shape import COARSEST, Surface, cell_for, faithful, levelled, scan_surface
 from studies.geometry.scanned.shells import solidified
-from studies.geometry.scanned.true_grid import true_grid, target_volume
+from studies.geometry.scanned.true_grid import target_volume, true_grid
 from studies.geometry.shape.levelset import Shape
 from studies.geometry.shape.regions import Region, region_from_dict
 from studies.geometry.surface.family import enclosed_volume
