@@ -148,7 +148,7 @@ def labels() -> list[str]:
     return re.findall(rf"\*\*\(({NUMBER})\)\*\*", (ROOT / "docs/theory.md").read_text(encoding="utf-8"))
 
 
-def said(source: Path) -> str:
+def prose(source: Path) -> str:
     """The comments and docstrings of a file."""
     with tokenize.open(source) as file:
         tokens = list(tokenize.generate_tokens(file.readline))
@@ -158,13 +158,13 @@ def said(source: Path) -> str:
 
 def test_every_equation_the_code_cites_is_in_the_theory():
     """Also a number that stands alone in brackets, as (8.5) does where a line breaks after "eq."."""
-    known, cited = set(labels()), 0
+    numbers, cited = set(labels()), 0
     for package in (*PACKAGES, "tests"):
         for source in ROOT.glob(f"{package}/**/*.py"):
-            text = said(source)
+            text = prose(source)
             for group in [*CITED.findall(text), *BARE.findall(text)]:
                 for number in re.findall(NUMBER, group):
-                    assert number in known, f"{source.name} cites equation {number}"
+                    assert number in numbers, f"{source.name} cites equation {number}"
                     cited += 1
     assert cited > 250
 

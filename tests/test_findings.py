@@ -271,18 +271,18 @@ def test_every_reference_has_three_meshes_or_more_and_three_refined_settings():
 def test_random_organs_are_counted_as_the_table_of_the_population_counts_them(published):
     """README's bounds are those of population.md, which are computed from the runs; a member that gets worse counts."""
     summary = (TABLES / "population" / "population.md").read_text(encoding="utf-8")
-    said = random_organs(TABLES)
+    text = random_organs(TABLES)
     bounds = {}
     for row in re.findall(r"^\| (\w+) \| adaptive [^|]*, 1594 \| (.+) \|$", summary, re.M):
         cells = row[1].split(" | ")
         spreads = (re.findall(r"[\d.]+", cell) for cell in (cells[2], cells[5]) if cell != "–")
         bounds[row[0]] = [number for bound, _, high in spreads for number in (bound, high)]
-        assert f"{sum(map(int, cells[0].split(', ')))} {row[0]}s" in said, "judged and failed"
+        assert f"{sum(map(int, cells[0].split(', ')))} {row[0]}s" in text, "judged and failed"
     assert len(bounds) == 5 and [len(bound) for bound in bounds.values()] == [4, 4, 4, 2, 2]
     for organ, bound in bounds.items():
-        quoted = re.findall(rf"{organ} ([\d.]+) \(([\d.]+)\)(?: and ([\d.]+) \(([\d.]+)\))?", said)[0]
+        quoted = re.findall(rf"{organ} ([\d.]+) \(([\d.]+)\)(?: and ([\d.]+) \(([\d.]+)\))?", text)[0]
         assert [float(number) for number in quoted if number] == pytest.approx([float(b) for b in bound], rel=0.06)
-    missed, total = (int(number) for number in re.findall(r"(\d+) of (\d+) miss", said)[0])
+    missed, total = (int(number) for number in re.findall(r"(\d+) of (\d+) miss", text)[0])
     path = published / "population" / "population.csv"
     rows = pd.read_csv(path)
     kidney = (rows["scene"] == "kidney_0_000") & (rows["nodes"] == 1594)
@@ -320,7 +320,7 @@ def test_counts_that_the_page_of_random_organs_quotes():
     assert count(finest & (rows["sway [%]"] > 1.0)) == {"liver": 14, "stomach": 35}
     coarser = {name: count((rows["nodes"] == 1194) & (sizes[name] > targets[name])) for name in targets}
     assert coarser == {"force_end": {"liver": 3}, "mean_error": {"liver": 21, "spleen": 9}}
-    said = page("docs/population.md")
+    text = page("docs/population.md")
     for words in (
         "for 25 of 76 livers, 8 of 76 kidneys and 10 of 30 spleens, in force for 9 of 76 livers",
         "20 livers and 9 spleens may be on either side",
@@ -328,7 +328,7 @@ def test_counts_that_the_page_of_random_organs_quotes():
         "3 of 76 livers miss the target in force (up to 4.3 %) and 21 in mean displacement",
         "one of 262 bodies, spleen_0_006",
     ):
-        assert words in said
+        assert words in text
 
 
 def test_methods_of_the_page_are_those_of_the_tuple():
@@ -344,12 +344,12 @@ def test_numbers_that_the_page_quotes_of_the_warning():
     assert len(counts) == 10, "of the members on which the rule was chosen, of the others, of bodies with fewer nodes"
     beyond, named, within, doubted = (counts[k] + counts[k + 4] for k in range(4))
     share = f"{doubted / within:.0%}".replace("%", " %")
-    said = page("docs/population.md")
-    assert f"It names {named} of {beyond} and doubts {doubted} of {within} ({share})" in said
+    text = page("docs/population.md")
+    assert f"It names {named} of {beyond} and doubts {doubted} of {within} ({share})" in text
     later = f"of the {counts[4] + counts[6]} members drawn later {counts[4]} are beyond, and it names {counts[5]}"
-    assert later in " ".join(said.split())
+    assert later in " ".join(text.split())
     for organ in ("liver", "spleen"):
         missed, alike = rows[organ][-2:]
-        assert f"{missed} {organ}s miss the target, {alike} of them" in said
+        assert f"{missed} {organ}s miss the target, {alike} of them" in text
     brief = page("docs/accuracy.md")
     assert f"named {named} of {beyond} bad bodies and doubted {doubted} of {within} good ones ({share})" in brief

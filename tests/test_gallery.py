@@ -65,15 +65,15 @@ def test_a_notebook_becomes_a_page_with_its_pictures(written):
 
 
 @pytest.mark.parametrize(
-    ("change", "said"),
+    ("change", "message"),
     [
         (("plt.plot([0, 1])", "plt.plotted([0, 1])"), "made.py fails: .*has no attribute 'plotted'"),
         (("organbench --version", "organbench --versoin"), "made.py fails: .*exit status 2"),
         (("plt.show()", "plt.close()"), "made.py shows no picture"),
     ],
 )
-def test_a_notebook_that_fails_or_shows_nothing_is_refused(gallery, written, change, said):
-    with pytest.raises(gallery.BrokenNotebook, match=re.compile(said, re.DOTALL)):
+def test_a_notebook_that_fails_or_shows_nothing_is_refused(gallery, written, change, message):
+    with pytest.raises(gallery.BrokenNotebook, match=re.compile(message, re.DOTALL)):
         written(GOOD.replace(*change))
 
 

@@ -77,9 +77,9 @@ def test_the_wheel_holds_the_three_packages_whole(wheel):
     names = set(zipfile.ZipFile(wheel).namelist())
     inside = {name for name in names if ".dist-info/" not in name}
     files = [file for package in PACKAGES for file in (ROOT / package.__name__).rglob("*") if file.is_file()]
-    wanted = {file.relative_to(ROOT).as_posix() for file in files if "__pycache__" not in file.parts}
-    wanted |= {f"studies/published/{table.parent.name}/{table.name}" for table in TABLES}
-    assert inside == wanted
+    expected = {file.relative_to(ROOT).as_posix() for file in files if "__pycache__" not in file.parts}
+    expected |= {f"studies/published/{table.parent.name}/{table.name}" for table in TABLES}
+    assert inside == expected
     assert {f"{package.__name__}/py.typed" for package in PACKAGES} <= inside
     top = {name.split("/")[0] for name in inside}
     assert top == {"massspring", "reference_fem", "studies"}

@@ -23,7 +23,7 @@ PINS = {
 }
 
 
-def asked_for() -> list[Requirement]:
+def requirements() -> list[Requirement]:
     extras = PROJECT["optional-dependencies"]
     texts = PROJECT["dependencies"] + [text for name in extras for text in extras[name]]
     return [r for r in map(Requirement, texts) if r.name != PROJECT["name"]]
@@ -34,27 +34,27 @@ def test_the_constraints_hold_nothing_but_pins():
     assert len(lines) == len(PINS)
 
 
-@pytest.mark.parametrize("requirement", asked_for(), ids=lambda r: r.name)
+@pytest.mark.parametrize("requirement", requirements(), ids=lambda r: r.name)
 def test_each_requirement_is_pinned_within_its_range(requirement):
     assert requirement.specifier.contains(PINS[canonicalize_name(requirement.name)])
 
 
 def test_what_the_requirements_require_is_pinned_too():
-    open_ends, seen = asked_for(), set()
+    open_ends, visited = requirements(), set()
     while open_ends:
         requirement = open_ends.pop()
         extra = next(iter(requirement.extras), "")
         name = canonicalize_name(requirement.name)
-        if (name, extra) in seen or (requirement.marker and not requirement.marker.evaluate({"extra": ""})):
+        if (name, extra) in visited or (requirement.marker and not requirement.marker.evaluate({"extra": ""})):
             continue
-        seen.add((name, extra))
+        visited.add((name, extra))
         assert name in PINS, f"{name} is installed unpinned"
         try:
             needs = map(Requirement, requires(name) or [])
         except PackageNotFoundError:  # an extra that is not installed here
             continue
         open_ends += [r for r in needs if r.marker is None or r.marker.evaluate({"extra": extra})]
-    assert len(seen) > 20
+    assert len(visited) > 20
 
 
 @pytest.mark.parametrize(

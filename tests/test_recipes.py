@@ -228,9 +228,9 @@ def test_an_added_study_runs_and_goes_on_where_it_was(recipe, tmp_path):
 def test_an_added_chart_keeps_the_contract(recipe, monkeypatch, tmp_path):
     chart = recipe("chart")
     study = replace(recipe("study").STUDY, charts=(Chart("added.png", chart.draw),))
-    (found,) = test_contract.good_runs((study,)).items()
-    assert found[0] is chart
-    monkeypatch.setitem(test_contract.GOOD, *found)
+    (entry,) = test_contract.good_runs((study,)).items()
+    assert entry[0] is chart
+    monkeypatch.setitem(test_contract.GOOD, *entry)
     odd = list(test_contract.ODD.values())
     assert hold(test_contract, "chart", chart=[chart], runs=odd, tmp_path=[tmp_path]) == 7
 

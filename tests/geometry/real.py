@@ -1,4 +1,4 @@
-"""The real surfaces that lie beside the project."""
+"""The real surfaces in shared/meshes, next to the project's folder."""
 
 from pathlib import Path
 

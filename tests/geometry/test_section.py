@@ -127,9 +127,9 @@ def test_bare_surfaces_are_not_cut_yet():
 
 def test_loops_follow_their_edges():
     edges = np.array([[0, 3], [3, 1], [1, 0], [7, 5], [5, 6], [6, 8], [8, 7]])
-    found = loops(edges)
-    assert [sorted(loop) for loop in found] == [[0, 1, 3], [5, 6, 7, 8]]
-    for loop in found:
+    polygons = loops(edges)
+    assert [sorted(loop) for loop in polygons] == [[0, 1, 3], [5, 6, 7, 8]]
+    for loop in polygons:
         steps = {tuple(sorted(pair)) for pair in zip(loop, np.roll(loop, -1), strict=True)}
         assert steps <= {tuple(sorted(edge)) for edge in edges.tolist()}
 

@@ -42,13 +42,13 @@ def test_a_dent_is_missing_in_the_piece_round_it():
     assert above.share == pytest.approx((over - 2 * turned + dent) / whole, rel=0.02)
 
 
-def test_pieces_of_a_bent_organ_are_told_apart():
+def test_a_plane_cuts_a_bent_organ_into_two_or_more_pieces():
     """A plane through both ends of the kidney."""
     surface = first_surface(make_shape("kidney", {}))
-    found = [len(sheet_of(plane(0.0, d), *surface).pieces) for d in np.random.default_rng(1).standard_normal((40, 3))]
-    assert min(found) == 2
-    counts = [sum(p.share for p in sheet_of(plane(0.002 * k, (1, 0, 0)), *surface).pieces) for k in range(-5, 6)]
-    np.testing.assert_allclose(counts, 1.0, rtol=1e-12)
+    counts = [len(sheet_of(plane(0.0, d), *surface).pieces) for d in np.random.default_rng(1).standard_normal((40, 3))]
+    assert min(counts) == 2
+    shares = [sum(p.share for p in sheet_of(plane(0.002 * k, (1, 0, 0)), *surface).pieces) for k in range(-5, 6)]
+    np.testing.assert_allclose(shares, 1.0, rtol=1e-12)
 
 
 @pytest.mark.parametrize(

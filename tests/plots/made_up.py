@@ -102,14 +102,14 @@ def fields(scene, kind, error, volume_end, good):
 def run(scene=BALL_SQUEEZE, kind="tetrahedral", method=None, status=Status.OK, error=0.2, **options) -> Run:
     """One run. Options: volume_end [1], with_reference, frame_ms, nodes, stiffness, dt [s], dt_limit [s], fraction."""
     good = {Status.DIVERGED: 5, Status.TIMED_OUT: 9}.get(status, FRAMES)
-    dt, given = options.get("dt", 1e-3), "dt" in options
+    dt, fixed_step = options.get("dt", 1e-3), "dt" in options
     case = Case(
         scene,
         BodyRecipe(
             kind, options.get("nodes", 550), stiffness=options.get("stiffness", 1.0), **options.get("recipe", {})
         ),
         method or ImplicitVolume(),
-        dt=dt if given else "auto",
+        dt=dt if fixed_step else "auto",
         dt_fraction=options.get("fraction", 0.5),
         timed="frame_ms" in options,
     )
@@ -136,9 +136,9 @@ def run(scene=BALL_SQUEEZE, kind="tetrahedral", method=None, status=Status.OK, e
         attributes={} if failed else attributes,
         fields={} if failed else fields(scene, kind, error, volume_end, good),
     )
-    known = reference(scene) if options.get("with_reference", True) else None
+    reference_record = reference(scene) if options.get("with_reference", True) else None
     timing = FrameTiming(frame_ns(options["frame_ms"]), 0) if "frame_ms" in options else None
-    return Run(case, record, known, timing)  # type: ignore[arg-type]
+    return Run(case, record, reference_record, timing)  # type: ignore[arg-type]
 
 
 def frame_ns(milliseconds, repeats=5):

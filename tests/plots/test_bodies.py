@@ -40,10 +40,10 @@ def test_every_kind_with_every_choice_of_volumes_looks_different():
 
 def test_a_known_body_looks_the_same_in_every_chart():
     alone = body_looks([run(kind="surface")])
-    beside = body_looks([run(**chosen) for chosen in reversed(RECIPES)])
+    all_looks = body_looks([run(**chosen) for chosen in reversed(RECIPES)])
     for body, look in alone.items():
-        assert beside[body].name == look.name
-        assert (beside[body].line, beside[body].marker) == (look.line, look.marker) == BODY_LOOKS["surface"]
+        assert all_looks[body].name == look.name
+        assert (all_looks[body].line, all_looks[body].marker) == (look.line, look.marker) == BODY_LOOKS["surface"]
 
 
 def test_bodies_of_one_method_have_the_colours_of_their_families():
@@ -73,7 +73,7 @@ def test_dash_patterns_fit_into_a_legend_entry():
         ([{}, {"weights": (1, 0.5, 2, 1)}], ["surface, default weights", "surface, weights 1:0.5:2:1"]),
     ],
 )
-def test_bodies_of_one_series_are_told_apart_by_what_differs(options, names):
+def test_names_of_bodies_of_one_series_say_what_differs(options, names):
     kind = names[0].split(",")[0]
     runs = [run(kind=kind, recipe=chosen) for chosen in options]
     assert named(runs) == names
@@ -100,16 +100,16 @@ def test_the_legend_shows_the_lines_that_are_drawn(chart):
         )
     ]
     figure = styled(chart.figure)(runs)
-    told = {
+    entries = {
         handle.get_label(): pattern(handle) for handle in figure.legends[0].legend_handles if isinstance(handle, Line2D)
     }
     drawn = [pattern(line) for line in figure.axes[0].get_lines()]
-    for name, looks in told.items():
+    for name, looks in entries.items():
         if name.startswith("tetrahedral"):
             assert drawn.count(looks) == 1, name
-    assert "tetrahedral, 32 volumes, free" in told
-    assert "tetrahedral, uniform, implicit volume" in told
-    assert "tetrahedral, van gelder, implicit volume" in told
+    assert "tetrahedral, 32 volumes, free" in entries
+    assert "tetrahedral, uniform, implicit volume" in entries
+    assert "tetrahedral, van gelder, implicit volume" in entries
 
 
 def pattern(line: Line2D):
@@ -120,8 +120,8 @@ def pattern(line: Line2D):
 
 def test_regions_of_different_number_have_lines_of_their_own_among_the_laws():
     runs = [run(recipe={"volumes": "regions", "regions": number}) for number in (8, 32)]
-    told = words(laws.figure(runs).legends[0])
-    assert "tetrahedral, 8 volumes" in told and "tetrahedral, 32 volumes" in told
+    legend = words(laws.figure(runs).legends[0])
+    assert "tetrahedral, 8 volumes" in legend and "tetrahedral, 32 volumes" in legend
 
 
 def test_rows_and_panels_carry_the_body():

@@ -39,11 +39,11 @@ def test_a_diverged_run_ends_where_it_broke_and_does_not_scale_the_axis():
     assert "diverged; shown up to there" in words(figure)
 
 
-def test_a_missing_reference_is_said():
-    said = "No error is shown for ball squeeze"
-    assert said in words(volume_history.figure([run(with_reference=False)]))
-    assert said in words(accuracy.figure([run(with_reference=False)]))
-    assert said not in words(volume_history.figure([run()]))
+def test_a_note_names_a_missing_reference():
+    note = "No error is shown for ball squeeze"
+    assert note in words(volume_history.figure([run(with_reference=False)]))
+    assert note in words(accuracy.figure([run(with_reference=False)]))
+    assert note not in words(volume_history.figure([run()]))
 
 
 def test_the_smaller_step_is_thin_and_in_the_lower_panel_alone():
@@ -70,9 +70,9 @@ def test_many_scenes_stand_in_rows_of_four():
     assert [axes.get_title() for axes in drawn if axes.get_title()] == [f"Ball {k}" for k in range(5)]
 
 
-@pytest.mark.parametrize(("error", "said"), [(0.25, "−25 %"), (-0.1, "+10 %")])
-def test_force_error_stands_at_the_end_of_its_line(error, said):
-    assert said in words(force_path.figure([run(error=error)]))
+@pytest.mark.parametrize(("error", "label"), [(0.25, "−25 %"), (-0.1, "+10 %")])
+def test_force_error_stands_at_the_end_of_its_line(error, label):
+    assert label in words(force_path.figure([run(error=error)]))
 
 
 @pytest.mark.parametrize(("error", "ends"), [(0.2, (0.0, 4.24)), (3.0, (-8.48, 0.0))])
@@ -104,12 +104,12 @@ def test_runs_that_did_not_end_ok_are_struck_out_and_named():
 def test_accuracy_never_below_the_floor_and_hollow_where_the_floor_matters(error):
     (axes,) = accuracy.figure([run(BALL_CLAMPED, error=error)]).axes
     bounds = [100 * UNCERTAINTY[name] for name in ("force", "surface", "interior", "silhouette")]
-    found = points(axes, BLUE)
-    assert len(found) == 4
-    for (_, height, hollow), bound in zip(found, bounds, strict=True):
+    marks = points(axes, BLUE)
+    assert len(marks) == 4
+    for (_, height, hollow), bound in zip(marks, bounds, strict=True):
         assert height >= bound
         assert hollow == (bound > 0.1 * height or height == bound)
-    assert found[0][1] == pytest.approx(max(100 * error, bounds[0]))
+    assert marks[0][1] == pytest.approx(max(100 * error, bounds[0]))
     shades = [patch.get_extents().y1 for patch in axes.collections[0].get_paths()]
     assert shades == pytest.approx(bounds[:1])
 
@@ -131,29 +131,29 @@ def test_a_method_costs_computing_time_per_simulated_second():
 def test_a_reference_that_is_not_ten_times_better_is_marked(chart):
     """Floors are 1 to 2 %: ten times better than errors of 300 %, not than those of 5 % (0.4 % of the silhouette)."""
 
-    def said(error):
+    def text(error):
         return words(chart.figure([run(BALL_CLAMPED, error=error, frame_ms=0.5)]))
 
-    assert UNRESOLVED_MARK not in said(3.0)
-    assert f"Ball clamped {UNRESOLVED_MARK}" in said(0.05)
-    note = said(0.05).split(f"{UNRESOLVED_MARK} Ball clamped: the uncertainty of the reference is ")[1]
+    assert UNRESOLVED_MARK not in text(3.0)
+    assert f"Ball clamped {UNRESOLVED_MARK}" in text(0.05)
+    note = text(0.05).split(f"{UNRESOLVED_MARK} Ball clamped: the uncertainty of the reference is ")[1]
     assert note.startswith(("up to", "as large as"))
     assert "force" in note
 
 
-def known(order=2.0, mesh=0.01):
+def error_bar(order=2.0, mesh=0.01):
     return Uncertainty({"mesh": mesh, "steps": 0.0, "contact": 0.002, "kappa": 1e-3}, order, 0.005)
 
 
 def test_shares_of_an_error_bar_are_drawn_where_they_are():
-    figure = uncertainty.figure({"ball_squeeze": {"force": known(), "interior": known(float("nan"), 0.03)}})
+    figure = uncertainty.figure({"ball_squeeze": {"force": error_bar(), "interior": error_bar(float("nan"), 0.03)}})
     (panel,) = figure.axes
     assert [(x, y) for x, y, _ in points(panel, VERMILLION)] == [(pytest.approx(0.2), 0), (pytest.approx(0.2), 1)]
     mesh = points(panel, BLUE)
     assert [x for x, _, _ in mesh] == pytest.approx([1.0, 3.0])
     assert [hollow for _, _, hollow in mesh] == [False, True]  # the second is a spread
     assert [x for x, _, _ in points(panel, ORANGE)] == [uncertainty.LOWEST] * 2
-    assert f"{100 * known().total:.2g}" in words(figure)
+    assert f"{100 * error_bar().total:.2g}" in words(figure)
     assert [label.get_text() for label in panel.get_yticklabels()] == ["force", "interior"]
     assert panel.get_ylim()[0] > panel.get_ylim()[1]
 
@@ -161,7 +161,7 @@ def test_shares_of_an_error_bar_are_drawn_where_they_are():
 def test_error_bars_stand_in_the_row_of_their_name():
     """A scene that allows fewer quantities leaves rows empty; it does not move up into another's."""
     names = ("force", "surface", "silhouette")
-    full, part = {name: known() for name in names}, {name: known(mesh=0.02) for name in ("force", "silhouette")}
+    full, part = {name: error_bar() for name in names}, {name: error_bar(mesh=0.02) for name in ("force", "silhouette")}
     figure = uncertainty.figure({"ball_squeeze": part, "ball_clamped": full})
     few, all_of_them = figure.axes
     assert [label.get_text() for label in few.get_yticklabels()] == list(names)
@@ -171,6 +171,6 @@ def test_error_bars_stand_in_the_row_of_their_name():
 
 def test_error_bars_without_references_say_so(tmp_path):
     assert "no reference" in words(uncertainty.figure({}))
-    uncertainty.draw({"ball_squeeze": {"force": known()}}, tmp_path / "a.png")
-    uncertainty.draw({"ball_squeeze": {"force": known()}}, tmp_path / "b.png")
+    uncertainty.draw({"ball_squeeze": {"force": error_bar()}}, tmp_path / "a.png")
+    uncertainty.draw({"ball_squeeze": {"force": error_bar()}}, tmp_path / "b.png")
     assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()

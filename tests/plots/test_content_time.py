@@ -86,10 +86,10 @@ def test_squeeze_shows_rest_both_methods_and_the_reference_with_their_numbers():
 
 
 @pytest.mark.parametrize(
-    ("worst", "said"), [(9.6e-9, "1 × 10⁻⁶"), (8.5e-9, "9 × 10⁻⁷"), (0.0, "1 × 10⁻¹⁴"), (3.5e-4, "4 × 10⁻²")]
+    ("worst", "bound"), [(9.6e-9, "1 × 10⁻⁶"), (8.5e-9, "9 × 10⁻⁷"), (0.0, "1 × 10⁻¹⁴"), (3.5e-4, "4 × 10⁻²")]
 )
-def test_squeeze_rounds_a_kept_volume_up(worst, said):
-    assert f"volume kept within {said} %" in words(squeeze.figure([run(volume_end=worst)]))
+def test_squeeze_rounds_a_kept_volume_up(worst, bound):
+    assert f"volume kept within {bound} %" in words(squeeze.figure([run(volume_end=worst)]))
 
 
 def test_squeeze_takes_the_larger_of_two_steps():
@@ -104,7 +104,7 @@ def test_made_up_frames_are_what_the_tests_above_think():
     assert np.median(times) == pytest.approx(1.02e6)
 
 
-def test_methods_are_told_apart_by_their_settings():
+def test_labels_of_methods_name_their_settings():
     from massspring import Element, Xpbd
     from studies.plots import methods
 

@@ -25,13 +25,13 @@ OWN = {stability: stability_grid, laws: laws_grid}
 
 def good_runs(studies):
     """Chart (a module with `figure` and `draw`) -> made-up runs, timed where its study is; each chart once."""
-    found = {}
+    runs = {}
     for study in studies:
         made = timed_grid if any(case.timed for case in study.cases) else grid
         for chart in study.charts:
             module = sys.modules[chart.draw.__module__]
-            found.setdefault(module, OWN.get(module, made))
-    return found
+            runs.setdefault(module, OWN.get(module, made))
+    return runs
 
 
 GOOD = good_runs(STUDIES)

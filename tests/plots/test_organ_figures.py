@@ -93,11 +93,11 @@ def middle(mesh):
 
 
 def test_organs_say_volume_wall_and_size(hollow):
-    said = words(organs.figure({"ball": octahedron()}))
-    assert f"{1e6 * VOLUME:.0f} mL" in said and "6 nodes, 8 triangles" in said and "8 tetrahedra" in said
-    assert "20 mm" in said
-    said = words(organs.figure({"ball": hollow}))
-    assert "wall 10 mm" in said and f"content {1e6 * hollow.lumen_volume:.0f} mL" in said
+    text = words(organs.figure({"ball": octahedron()}))
+    assert f"{1e6 * VOLUME:.0f} mL" in text and "6 nodes, 8 triangles" in text and "8 tetrahedra" in text
+    assert "20 mm" in text
+    text = words(organs.figure({"ball": hollow}))
+    assert "wall 10 mm" in text and f"content {1e6 * hollow.lumen_volume:.0f} mL" in text
 
 
 def words(figure):
@@ -108,15 +108,15 @@ def test_springs_are_those_of_the_body(tmp_path):
     mesh = octahedron(tetrahedra=np.zeros((0, 4), int), points=POINTS[:6])
     figure = organ_springs.figure({"ball": mesh})
     body = organ_springs.body_of(mesh)
-    said = words(figure)
+    text = words(figure)
     for axes, (title, (kind, _)) in zip(figure.axes[1:], organ_springs.PANELS.items(), strict=True):
         lines = axes.collections[0].get_segments()
         assert len(lines) == (body.springs.kind == kind).sum() > 0
         drawn = sorted(np.linalg.norm(line[1] - line[0]) for line in map(np.asarray, lines))
         ends = organs.FRONT.see(body.rest)[body.springs.ends[body.springs.kind == kind].astype(int)][:, :, :2]
         assert drawn == pytest.approx(sorted(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)))
-        assert f"{title.capitalize()}\n{len(lines)}" in said
-    assert "6 nodes, 8 triangles" in said
+        assert f"{title.capitalize()}\n{len(lines)}" in text
+    assert "6 nodes, 8 triangles" in text
     organ_springs.draw_organ_springs({"ball": mesh}, tmp_path / "a.png")
     assert (tmp_path / "a.png").stat().st_size > 2000
 

@@ -88,9 +88,9 @@ def test_a_legend_stays_on_the_page_and_over_its_notes(letters):
 
 def test_many_notes_are_cut_short():
     figure = finish(page(8.0, 3.0), "Title", [], [f"note {k}" for k in range(50)])
-    said = figure.texts[-1].get_text()
-    assert "note 7" in said
-    assert "42 more" in said
+    note = figure.texts[-1].get_text()
+    assert "note 7" in note
+    assert "42 more" in note
     assert figure.get_figheight() < 5
 
 

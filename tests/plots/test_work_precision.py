@@ -46,8 +46,8 @@ LADDER = (
 
 def markers(axes, marker):
     """(x, y) of the points of one family, whatever their error bars."""
-    found = [line for line in axes.get_lines() if line.get_marker() == marker and line.get_markerfacecolor() != "none"]
-    return [(float(line.get_xdata()[0]), float(line.get_ydata()[0])) for line in found if len(line.get_xdata()) == 1]
+    lines = [line for line in axes.get_lines() if line.get_marker() == marker and line.get_markerfacecolor() != "none"]
+    return [(float(line.get_xdata()[0]), float(line.get_ydata()[0])) for line in lines if len(line.get_xdata()) == 1]
 
 
 def test_points_lie_at_cost_and_error_of_force_and_displacement():
@@ -113,12 +113,12 @@ def test_a_run_that_ended_with_a_fault_is_no_point():
     faulty = at(0.1, 0.1, status=Status.INVERTED)
     figure = work.figure([LADDER[0], faulty, run(BALL_CLAMPED, nodes=99)])
     assert markers(figure.axes[0], "o") == []
-    told = words(figure).replace("\n", " ")
-    assert f"failed: {faulty.case.name} inverted." in told
-    assert "Not drawn (no frame times for this machine and code version): 1." in told
+    text = words(figure).replace("\n", " ")
+    assert f"failed: {faulty.case.name} inverted." in text
+    assert "Not drawn (no frame times for this machine and code version): 1." in text
 
 
-def test_what_a_scene_does_not_compare_is_said():
+def test_a_panel_names_what_its_scene_does_not_compare():
     force, displacement = work.figure([at(0.1, 0.1, scene=BALL_SQUEEZE)]).axes
     assert "compares no displacement" in words(displacement) and "compares" not in words(force)
 
@@ -131,7 +131,7 @@ def test_every_scene_has_two_panels_below_one_another():
     assert [axes.get_title() != "" for axes in shown] == [True] * 3 + [False] * 3 + [True, False]
 
 
-def test_families_are_told_apart_without_colour():
+def test_families_differ_without_colour():
     looks = [*FAMILIES.values(), VIRTUAL_NODES, *CONTESTANTS.values()]
     assert len({look.marker for look in looks}) == len({look.colour for look in looks}) == len(looks)
     assert family_of(LADDER[0].case).colour == BLACK and family_of(LADDER[1].case).colour == VERMILLION

@@ -51,7 +51,7 @@ def test_both_codes_agree_at_every_node(ours):
 
 @needs_ngsolve
 @pytest.mark.parametrize("changes", [{"material": NeoHookean(1.0, 1010.0)}, {"order": 6}], ids=["bulk", "quadrature"])
-def test_another_bulk_modulus_or_rule_is_seen(ours, changes):
+def test_another_bulk_modulus_or_rule_makes_a_difference(ours, changes):
     """A hundredth of kappa, or other quadrature points, move the answer by more than the codes may differ."""
     theirs = solve(stretched(**changes), STEPS)
     assert np.abs(ours.p - theirs.p).max() > 100.0 * AGREEMENT * np.abs(theirs.p).max()
@@ -76,11 +76,11 @@ def test_the_four_opinions():
         built.append(pulled_organ(mesh, low, high, (0.0, 0.1, 0.2)))
         return built[0]
 
-    found = opinions(organ, organ)
+    oracles = opinions(organ, organ)
     assert not built
-    assert [oracle.name for oracle in found] == ["second_ball", "second_sphere", "second_organ", "second_cut"]
-    assert all("NGSolve" in oracle.source and not oracle.fast for oracle in found)
-    outcome = found[2].measure()
+    assert [oracle.name for oracle in oracles] == ["second_ball", "second_sphere", "second_organ", "second_cut"]
+    assert all("NGSolve" in oracle.source and not oracle.fast for oracle in oracles)
+    outcome = oracles[2].measure()
     assert len(built) == 1
     assert all(check.met for check in outcome.checks)
     assert outcome.checks[0].expected > 100.0
@@ -105,7 +105,7 @@ def test_what_the_translation_does_not_cover_is_refused(changes, message):
 
 
 @needs_ngsolve
-def test_a_newton_that_does_not_converge_is_told():
+def test_a_newton_that_does_not_converge_is_refused():
     model = ngsolve_code.NgsolveModel(stretched())
     with pytest.raises(SolveError, match="did not converge in 0 iterations"):
         model.newton("umfpack", 1e-9, most=0)

@@ -48,16 +48,18 @@ def test_a_stress_that_is_linear_is_recovered():
 
 def test_it_grows_with_the_square_of_the_stress_and_with_volume():
     """Ten times as stiff, a hundred times the indicator; twice as long, eight times the volume."""
-    found = {}
+    indicators = {}
     for name, (stiffness, length) in {"one": (1.0, 1.0), "stiff": (10.0, 1.0), "long": (1.0, 2.0)}.items():
         mesh = block((2, 2, 2), skew=0.05).scaled(length)
         problem = Problem(mesh, NeoHookean(stiffness, 1e3 * stiffness), [PrescribedDisplacement(lambda x: x[2] < 1e-9)])
         system = System(problem, NewtonSettings())
         a, b, c = nodes(mesh).T / length
         u = 0.05 * length * np.stack([a * b * c, c**2, a**2], axis=1)
-        found[name] = stress_indicator(system, np.concatenate([u.ravel(), np.full(mesh.nvertices, 0.1 * stiffness)]))
-    np.testing.assert_allclose(found["stiff"], 100 * found["one"], rtol=1e-9)
-    np.testing.assert_allclose(found["long"], 8 * found["one"], rtol=1e-9)
+        indicators[name] = stress_indicator(
+            system, np.concatenate([u.ravel(), np.full(mesh.nvertices, 0.1 * stiffness)])
+        )
+    np.testing.assert_allclose(indicators["stiff"], 100 * indicators["one"], rtol=1e-9)
+    np.testing.assert_allclose(indicators["long"], 8 * indicators["one"], rtol=1e-9)
 
 
 def test_elements_at_a_singular_edge_come_first():
@@ -65,15 +67,15 @@ def test_elements_at_a_singular_edge_come_first():
     mesh = block((6, 2, 4))
     glued = PrescribedDisplacement(lambda x: (x[2] < 1e-9) & (x[0] < 0.5 + 1e-9))
     pulled = PrescribedDisplacement(lambda x: x[2] > 1 - 1e-9, motion=lambda t: (0.0, 0.0, t))
-    problem, found = Problem(mesh, SOLID, [glued, pulled]), []
-    equilibrium_path(problem, (0.05,), on_checkpoint=found.append)
-    indicator = stress_indicator(System(problem, NewtonSettings()), found[-1].state.x)
+    problem, checkpoints = Problem(mesh, SOLID, [glued, pulled]), []
+    equilibrium_path(problem, (0.05,), on_checkpoint=checkpoints.append)
+    indicator = stress_indicator(System(problem, NewtonSettings()), checkpoints[-1].state.x)
     corners = mesh.p.T[mesh.t.T]
     on = (np.abs(corners[..., 0] - 0.5) < 1e-9) & (corners[..., 2] < 1e-9)
-    beside = on.any(axis=1)
-    assert 0.02 < beside.mean() < 0.2
-    largest = np.argsort(-indicator)[: beside.sum() // 3]
-    assert beside[largest].all()
+    at_edge = on.any(axis=1)
+    assert 0.02 < at_edge.mean() < 0.2
+    largest = np.argsort(-indicator)[: at_edge.sum() // 3]
+    assert at_edge[largest].all()
 
 
 def places(mesh, degree=4):

@@ -22,10 +22,10 @@ def clamped():
 def test_the_ball_between_planes_has_the_known_force_and_equator():
     """Two dozen triangles: 1.2 % at the shallow push; a factor of two or π is far outside."""
     pressed = between_planes(BALL, (0.1, 0.2), COARSE)
-    known = np.array([BALL_BETWEEN_PLANES[share] for share in (0.10, 0.20)])
-    np.testing.assert_allclose(pressed.force, known[:, 0], rtol=0.02)
+    expected = np.array([BALL_BETWEEN_PLANES[share] for share in (0.10, 0.20)])
+    np.testing.assert_allclose(pressed.force, expected[:, 0], rtol=0.02)
     (moved,) = pressed.displacement(np.array([[0.0, 1.0, 0.0]]))
-    np.testing.assert_allclose(moved, [0.0, known[1, 1] - 1.0, 0.0], atol=1e-3)
+    np.testing.assert_allclose(moved, [0.0, expected[1, 1] - 1.0, 0.0], atol=1e-3)
 
 
 def test_the_quarter_is_a_quarter_of_the_disc_and_finer_at_the_edge():

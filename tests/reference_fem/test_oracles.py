@@ -17,9 +17,9 @@ FAST = [
 
 @pytest.mark.parametrize("oracle", FAST)
 def test_every_number_is_where_it_must_be(oracle):
-    found = oracle.measure()
-    assert found.checks
-    off = [f"{c.quantity}: {c.got:.8g}, expected {c.expected:.8g}" for c in found.checks if not c.met]
+    outcome = oracle.measure()
+    assert outcome.checks
+    off = [f"{c.quantity}: {c.got:.8g}, expected {c.expected:.8g}" for c in outcome.checks if not c.met]
     assert not off, "; ".join(off)
 
 

@@ -56,7 +56,7 @@ def soft_and_stiff(ball):
 @needs_ngsolve
 def test_at_second_order_it_is_the_reference_but_for_how_deep_obstacles_sink_in(reference, soft_and_stiff):
     """0.17 % at the greater stiffness; a tenth of the stiffness is ten times farther off, so nothing else differs."""
-    soft, stiff = (np.abs(found.obstacle_force - reference.obstacle_force).max() for found in soft_and_stiff)
+    soft, stiff = (np.abs(solution.obstacle_force - reference.obstacle_force).max() for solution in soft_and_stiff)
     assert stiff < 0.003 * np.abs(reference.obstacle_force).max()
     assert soft / stiff == pytest.approx(STIFF[1] / STIFF[0], rel=0.1)
 
@@ -64,18 +64,20 @@ def test_at_second_order_it_is_the_reference_but_for_how_deep_obstacles_sink_in(
 @needs_ngsolve
 def test_displacement_is_the_references_at_every_node(ball, reference, soft_and_stiff):
     """Mid-side nodes too, so that points are found in curved elements; a cap's nodes move as the cap does."""
-    found = soft_and_stiff[1].displacement(nodes(ball.mesh))
-    np.testing.assert_allclose(found, reference.u, atol=0.005 * np.abs(reference.u).max())
+    displacement = soft_and_stiff[1].displacement(nodes(ball.mesh))
+    np.testing.assert_allclose(displacement, reference.u, atol=0.005 * np.abs(reference.u).max())
     held = ball.held[0].where(nodes(ball.mesh).T)
-    np.testing.assert_allclose(found[held], np.broadcast_to([0.1, 0.0, 0.0], found[held].shape), atol=1e-9)
+    np.testing.assert_allclose(
+        displacement[held], np.broadcast_to([0.1, 0.0, 0.0], displacement[held].shape), atol=1e-9
+    )
 
 
 @needs_ngsolve
 def test_forces_are_in_balance(soft_and_stiff):
     """The potential and the force of an obstacle have the same points."""
-    for found in soft_and_stiff:
-        total = found.obstacle_force.sum(axis=0) + found.held_force.sum(axis=0)
-        np.testing.assert_allclose(total, 0.0, atol=1e-7 * np.abs(found.held_force).max())
+    for solution in soft_and_stiff:
+        total = solution.obstacle_force.sum(axis=0) + solution.held_force.sum(axis=0)
+        np.testing.assert_allclose(total, 0.0, atol=1e-7 * np.abs(solution.held_force).max())
 
 
 def pulled_block(cells):

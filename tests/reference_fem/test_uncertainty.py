@@ -57,7 +57,7 @@ def test_a_fine_change_that_is_small_by_chance_makes_no_small_bar(fine_change, f
 
 
 def fast_then_slow(h):
-    """Off by h, as beside an outline, and by a part that fills the change of the coarse pair."""
+    """Off by h, as next to an outline, and by a part that fills the change of the coarse pair."""
     return 1.0 * h + 0.0075 * h**12
 
 
@@ -97,13 +97,13 @@ def test_a_field_has_the_order_of_its_size(order):
 
 @pytest.mark.parametrize("order", [1.0, 2.0, 2.5])
 @pytest.mark.parametrize("own", [0.5, 1.0, 3.0])
-def test_errors_that_each_mesh_has_for_itself_are_told_apart(order, own):
+def test_errors_that_each_mesh_has_for_itself_are_separated(order, own):
     """Independent fields on top of a common one, `own` times as large: extrapolation sees the common one alone."""
     noise = np.random.default_rng(5)
     common = noise.normal(size=(3000, 3))
     fields = [1.0 + h**order * (common + own * noise.normal(size=(3000, 3))) for h in SIZES]
     error = field_error(SIZES, fields, np.full(3000, 1 / 9000))
-    # 9,000 independent numbers tell the order to a few hundredths and sizes to a few per cent.
+    # 9,000 independent numbers give the order to a few hundredths and sizes to a few per cent.
     assert error.order == pytest.approx(order, abs=0.15)
     assert error.uncertainty == pytest.approx(SAFETY * np.sqrt(1 + own**2), rel=0.1)
     assert error.shift == pytest.approx(1.0, rel=0.25)
@@ -204,8 +204,8 @@ def test_nested_meshes_of_the_rates_of_theory_are_covered(rate):
 @pytest.mark.parametrize("fine_change", [0.0, 1e-6, 0.01])
 def test_a_fine_change_of_nested_meshes_that_is_small_by_chance_makes_no_small_bar(fine_change):
     coarse = 0.2
-    wanted = SAFETY * coarse / ((UNKNOWNS[0] / UNKNOWNS[2]) ** (2 / 3) - 1)
-    assert nested_error(UNKNOWNS, [fine_change, coarse]) == pytest.approx(wanted, rel=1e-12)
+    expected = SAFETY * coarse / ((UNKNOWNS[0] / UNKNOWNS[2]) ** (2 / 3) - 1)
+    assert nested_error(UNKNOWNS, [fine_change, coarse]) == pytest.approx(expected, rel=1e-12)
     large = SAFETY * coarse / ((UNKNOWNS[0] / UNKNOWNS[1]) ** (2 / 3) - 1)
     assert nested_error(UNKNOWNS, [-coarse, fine_change]) == pytest.approx(large, rel=1e-12)
 

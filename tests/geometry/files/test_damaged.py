@@ -73,9 +73,9 @@ def test_every_whole_file_is_read(tmp_path):
     for name, content in whole(tmp_path).items():
         path = tmp_path / f"again.{name}"
         path.write_bytes(content)
-        found = opened(Source(path))
+        surface = opened(Source(path))
         want, near = (216 * 5.0**3, 0.15) if name == "nii" else (4.8e-5, 1e-5)
-        assert signed_volume(found.points, found.triangles) == pytest.approx(want, rel=near), name
+        assert signed_volume(surface.points, surface.triangles) == pytest.approx(want, rel=near), name
 
 
 def test_damaged_files_get_a_sentence_in_words(tmp_path):
@@ -91,8 +91,8 @@ def test_damaged_files_get_a_sentence_in_words(tmp_path):
                     examine(path, unit=None if name == "nii" else "m")
             except StudyError as error:
                 refused.append((path.name, str(error), f"{name}, {what}"))
-    for file, said, which in refused:
-        assert file in said and "\n" not in said and not PYTHON.search(said), f"{which}: {said}"
+    for file, reason, which in refused:
+        assert file in reason and "\n" not in reason and not PYTHON.search(reason), f"{which}: {reason}"
     assert tried > 200 and len(refused) > tried / 2
 
 
@@ -101,7 +101,7 @@ COMMAS += b" endloop\nendfacet\nendsolid x\n"
 
 
 @pytest.mark.parametrize(
-    ("name", "content", "told"),
+    ("name", "content", "reason"),
     [
         ("a.ply", b"", "(it is empty)"),
         ("a.ply", b"ply\nformat ascii 1.0\nelement vertex 4000000000\nend_header\n", "promises 4,000,000,000 points"),
@@ -128,20 +128,20 @@ COMMAS += b" endloop\nendfacet\nendsolid x\n"
         ("a.stl", COMMAS.replace(b".", b","), "line 4 has decimal commas, 'vertex 1,5 0,25 -3e0': export it with"),
     ],
 )
-def test_the_reason_is_the_true_one(tmp_path, name, content, told):
+def test_the_reason_is_the_true_one(tmp_path, name, content, reason):
     path = tmp_path / name
     path.write_bytes(content)
     with pytest.raises(StudyError) as caught:
         opened(Source(path))
-    assert told in str(caught.value)
+    assert reason in str(caught.value)
 
 
 @pytest.mark.parametrize("suffix", ["obj", "stl", "off"])
 def test_surfaces_without_a_usable_triangle_are_findings(tmp_path, suffix):
     path = tmp_path / f"flat.{suffix}"
     meshio.write_points_cells(path, np.zeros((3, 3)), [("triangle", np.array([[0, 1, 2]]))])
-    found = examine(path, unit="mm")
-    assert "collapsed" in [finding.code for finding in found.findings]
+    report = examine(path, unit="mm")
+    assert "collapsed" in [finding.code for finding in report.findings]
 
 
 def test_a_closed_surface_with_a_hole_in_its_numbers_is_a_finding_without_a_unit(tmp_path):

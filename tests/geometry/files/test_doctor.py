@@ -92,21 +92,21 @@ def sliver(points, _):
 
 
 @pytest.mark.parametrize("code", broken())
-def test_every_fault_is_found(tmp_path, code):
+def test_every_fault_is_named(tmp_path, code):
     points, faces, count, piece = broken()[code]
-    found = examined(tmp_path, points, faces, unit="m")
-    by_code = {finding.code: finding for finding in found.findings}
+    report = examined(tmp_path, points, faces, unit="m")
+    by_code = {finding.code: finding for finding in report.findings}
     assert code in by_code, list(by_code)
     assert piece in by_code[code].sentence and "\n" not in by_code[code].sentence
     assert by_code[code].count == count or (count is None and by_code[code].count > 0)
-    assert by_code[code].mend and not found.clean
-    json.dumps(found.to_dict(), allow_nan=False)
+    assert by_code[code].mend and not report.clean
+    json.dumps(report.to_dict(), allow_nan=False)
 
 
 def test_a_sound_surface_has_no_findings(tmp_path, livers):
-    found = examined(tmp_path, POINTS, FACES)
-    assert found.clean and found.findings == ()
-    m = found.measures
+    report = examined(tmp_path, POINTS, FACES)
+    assert report.clean and report.findings == ()
+    m = report.measures
     assert m["closed"] and m["manifold"] and m["oriented"] and m["genus"] == 0 and m["parts"] == 1
     assert m["size"] == pytest.approx([0.06, 0.05, 0.04], rel=1e-12) and m["unit"] == "m"
     # Octahedral subdivision of an ellipsoid: 15 % less than 4/3 pi abc at 98 nodes, so only the size is checked.
@@ -116,38 +116,38 @@ def test_a_sound_surface_has_no_findings(tmp_path, livers):
 
 def test_lumens_are_no_faults(tmp_path):
     hollow = together((POINTS, FACES), (0.7 * POINTS, FACES[:, ::-1]))
-    found = examined(tmp_path, *hollow)
-    assert found.clean and found.measures["lumens"] == 1 and found.measures["parts"] == 2
-    beside = together((POINTS, FACES), (0.7 * POINTS + (0.1, 0, 0), FACES[:, ::-1]))
-    codes = {finding.code for finding in examined(tmp_path, *beside).findings}
+    report = examined(tmp_path, *hollow)
+    assert report.clean and report.measures["lumens"] == 1 and report.measures["parts"] == 2
+    two_parts = together((POINTS, FACES), (0.7 * POINTS + (0.1, 0, 0), FACES[:, ::-1]))
+    codes = {finding.code for finding in examined(tmp_path, *two_parts).findings}
     assert codes == {"parts", "inside_out"}
 
 
 def test_units_are_asked_about_and_taken_for_the_numbers(tmp_path):
-    found = examined(tmp_path, 1e3 * POINTS, FACES)
-    (finding,) = found.findings
+    report = examined(tmp_path, 1e3 * POINTS, FACES)
+    (finding,) = report.findings
     assert finding.code == "unit" and "longest side of 60 is an organ's in cm or mm" in finding.sentence
-    assert found.measures["unit"] == "mm" and found.measures["size"][0] == pytest.approx(0.06)
+    assert report.measures["unit"] == "mm" and report.measures["size"][0] == pytest.approx(0.06)
     assert examined(tmp_path, 1e3 * POINTS, FACES, unit="mm").clean
     with pytest.raises(StudyError, match="unit 'inch' is not known"):
         examined(tmp_path, POINTS, FACES, unit="inch")
 
 
 def test_stl_repeats_its_corners_by_nature(tmp_path):
-    found = examined(tmp_path, POINTS, FACES, suffix="stl")
-    assert found.clean and found.measures["nodes"] == len(POINTS)
+    report = examined(tmp_path, POINTS, FACES, suffix="stl")
+    assert report.clean and report.measures["nodes"] == len(POINTS)
 
 
 def test_bodies_are_examined_too(tmp_path, livers):
     body = livers[150]
     path = tmp_path / "body.vtu"
     meshio.write_points_cells(path, body.points, [("tetra", body.tetrahedra)])
-    found = examine(path)
-    assert found.clean and found.measures["kind"] == "tetrahedra"
-    assert found.measures["volume"] == pytest.approx(body.volume, rel=1e-12)
+    report = examine(path)
+    assert report.clean and report.measures["kind"] == "tetrahedra"
+    assert report.measures["volume"] == pytest.approx(body.volume, rel=1e-12)
     springs = step_limit(tetrahedral_body(body.points, body.triangles, body.tetrahedra, Material(1800.0, 1060.0)))
-    assert found.measures["springs"]["how"] == "measured"
-    assert found.measures["springs"]["dt_limit"] == pytest.approx(springs.undamped, rel=1e-3)
+    assert report.measures["springs"]["how"] == "measured"
+    assert report.measures["springs"]["dt_limit"] == pytest.approx(springs.undamped, rel=1e-3)
     stiff = examine(path, tissue=(7200.0, 1060.0)).measures["springs"]
     assert stiff["dt_limit"] == pytest.approx(springs.undamped / 2, rel=1e-3)  # omega ~ sqrt(mu)
     bad = body.tetrahedra.copy()
@@ -167,16 +167,16 @@ def test_bodies_are_examined_too(tmp_path, livers):
 
 
 def test_a_single_triangle_is_examined(tmp_path):
-    found = examined(tmp_path, 0.1 * np.eye(3), [[0, 1, 2]])
-    codes = {finding.code for finding in found.findings}
-    assert codes == {"open"} and found.measures["volume"] == pytest.approx(0, abs=1e-3)
+    report = examined(tmp_path, 0.1 * np.eye(3), [[0, 1, 2]])
+    codes = {finding.code for finding in report.findings}
+    assert codes == {"open"} and report.measures["volume"] == pytest.approx(0, abs=1e-3)
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_real_surfaces_are_sound(name):
-    found = examine(real_surface(name), unit="mm")
-    assert found.clean and found.measures["genus"] == 0
-    assert found.measures["springs"]["dt_limit"] > 0
+    report = examine(real_surface(name), unit="mm")
+    assert report.clean and report.measures["genus"] == 0
+    assert report.measures["springs"]["dt_limit"] > 0
 
 
 def test_what_is_no_mesh_is_refused(tmp_path):

@@ -44,7 +44,7 @@ def test_estimates_are_of_the_right_size(tmp_path, balls, suffix):
     assert size_warning(path) is None
 
 
-def test_truncated_binary_stl_is_told(tmp_path, balls):
+def test_truncated_binary_stl_is_refused(tmp_path, balls):
     path = tmp_path / "half.stl"
     write_mesh(balls[150].outer(), path)
     check_whole(path)

@@ -57,8 +57,8 @@ def test_gltf_parts_are_listed_and_chosen_where_the_file_puts_them(tmp_path):
     parts = [("capsule", SMALL, FACES, (100, 0, 0)), ("tissue", POINTS, FACES, (0, 7, 0))]
     path = written(tmp_path / "organ.glb", writers.glb(parts))
     assert opened(Source(path)).names == ("capsule", "tissue")
-    for wanted, scale, middle in (("tissue", 1.0, (0, 7, 0)), ("1", 0.4, (100, 0, 0)), ("Capsule", 0.4, (100, 0, 0))):
-        mesh = read_mesh(Source(path, "mm", part=wanted))
+    for part, scale, middle in (("tissue", 1.0, (0, 7, 0)), ("1", 0.4, (100, 0, 0)), ("Capsule", 0.4, (100, 0, 0))):
+        mesh = read_mesh(Source(path, "mm", part=part))
         assert mesh.volume == pytest.approx(1e-9 * scale**3 * VOLUME, rel=1e-5)
         np.testing.assert_allclose(1e3 * mesh.points.mean(axis=0), middle, atol=1e-4)
     rows = examine(Source(path, "mm")).measures["part_list"]
@@ -78,15 +78,15 @@ def test_objects_and_relative_numbers_of_obj(tmp_path):
     content = writers.obj([("one", SMALL + 90, FACES), ("two", POINTS, FACES)])
     path = written(tmp_path / "two.obj", content)
     assert opened(Source(path)).names == ("one", "two")
-    for wanted, factor in (("one", 0.4), ("2", 1.0)):
-        assert read_mesh(Source(path, "mm", part=wanted)).volume == pytest.approx(1e-9 * factor**3 * VOLUME, rel=1e-6)
+    for part, factor in (("one", 0.4), ("2", 1.0)):
+        assert read_mesh(Source(path, "mm", part=part)).volume == pytest.approx(1e-9 * factor**3 * VOLUME, rel=1e-6)
 
 
 def test_parts_without_names_are_numbered_by_size(tmp_path):
     shifted = [np.vstack([SMALL + 90, POINTS]), np.vstack([FACES, FACES + len(POINTS)])]
     path = written(tmp_path / "two.vtk", writers.legacy_vtk(*shifted, binary=True))
-    for wanted, factor in (("1", 1.0), ("2", 0.4)):
-        mesh = scan(Source(path, "mm", part=wanted), fill=False)
+    for part, factor in (("1", 1.0), ("2", 0.4)):
+        mesh = scan(Source(path, "mm", part=part), fill=False)
         assert mesh.volume == pytest.approx(1e-9 * factor**3 * VOLUME, rel=1e-6)
     with pytest.raises(StudyError, match="has 2 parts, numbered from 1 by their size; there is no '3'"):
         scan(Source(path, "mm", part="3"))
@@ -107,7 +107,7 @@ def test_any_scale_leads_to_the_same_body(tmp_path, options):
 
 
 @pytest.mark.parametrize(
-    ("options", "told"),
+    ("options", "sentence"),
     [
         ({"scale": 0.0}, "a scale of 0 is asked for"),
         ({"scale": float("nan")}, "a scale of nan"),
@@ -116,8 +116,8 @@ def test_any_scale_leads_to_the_same_body(tmp_path, options):
         ({"unit": "furlong"}, "use one of m, cm, mm, in"),
     ],
 )
-def test_scales_that_are_none_are_refused(tmp_path, options, told):
-    with pytest.raises(StudyError, match=told):
+def test_scales_that_are_none_are_refused(tmp_path, options, sentence):
+    with pytest.raises(StudyError, match=sentence):
         Source(tmp_path / "egg.vtk", **options)
 
 

@@ -81,7 +81,7 @@ def test_segments_of_slicer_have_names(tmp_path):
         read_mesh(path)
 
 
-def test_an_organ_cut_off_by_the_image_is_told(tmp_path):
+def test_a_warning_names_an_organ_cut_off_by_the_image(tmp_path):
     labels, affine = ellipsoid(shift=30.0)
     path = nifti(tmp_path / "cut.nii", labels, affine)
     with pytest.warns(UserWarning, match=r"cut\.nii: label 1 reaches the edge of the image"):
@@ -111,8 +111,8 @@ def test_what_is_no_mask_gets_a_sentence(tmp_path, mask):
         "has 4 dimensions": Source(nifti(tmp_path / "two.nii", np.stack([labels, labels], axis=-1), affine)),
         "half.nii.gz is not a mesh that can be read .it is cut short": Source(half),
     }
-    for told, source in cases.items():
-        with pytest.raises(StudyError, match=told) as caught:
+    for sentence, source in cases.items():
+        with pytest.raises(StudyError, match=sentence) as caught:
             opened(source)
         assert "\n" not in str(caught.value)
 

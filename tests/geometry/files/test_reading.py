@@ -69,7 +69,7 @@ def test_body_keeps_its_tetrahedra_and_gets_its_surface_first(tmp_path, balls):
     assert mesh.volume == pytest.approx(body.volume, rel=1e-12)
 
 
-def test_inside_out_is_said_and_mended_on_request(tmp_path, balls, surface):
+def test_inside_out_is_refused_and_flipped_on_request(tmp_path, balls, surface):
     points, triangles = surface
     path = write(tmp_path / "b.ply", points, triangle=triangles[:, ::-1])
     with pytest.raises(StudyError, match=r"b\.ply: the surface is inverted"):

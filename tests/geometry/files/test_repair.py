@@ -1,4 +1,4 @@
-"""Mending: every change is made, counted and reported."""
+"""Repair of surfaces: every change is made, counted and reported."""
 
 import numpy as np
 import pytest
@@ -12,8 +12,8 @@ from tests.geometry.boxes import box, split, together
 
 def test_a_sound_surface_is_left_alone():
     points, faces = split(*box())
-    mended = mend(points, faces, "box")
-    assert (mended.points == points).all() and (mended.triangles == faces).all() and mended.remarks == ()
+    surface = mend(points, faces, "box")
+    assert (surface.points == points).all() and (surface.triangles == faces).all() and surface.remarks == ()
 
 
 def test_neighbours_are_made_to_agree_and_to_look_outward():
@@ -21,13 +21,13 @@ def test_neighbours_are_made_to_agree_and_to_look_outward():
     mixed = faces.copy()
     turn = np.random.default_rng(0).random(len(faces)) < 0.3
     mixed[turn] = mixed[turn, ::-1]
-    mended = mend(points, mixed, "box")
-    assert signed_volume(mended.points, mended.triangles) == pytest.approx(1.0, rel=1e-12)
-    check_surface(mended.points, mended.triangles)
-    assert mended.remarks == (f"{turn.sum()} triangles are flipped to agree with their neighbours",)
-    mended = mend(points, faces[:, ::-1], "box")
-    assert signed_volume(mended.points, mended.triangles) == pytest.approx(1.0, rel=1e-12)
-    assert mended.remarks == ("the surface was inverted and has been flipped",)
+    surface = mend(points, mixed, "box")
+    assert signed_volume(surface.points, surface.triangles) == pytest.approx(1.0, rel=1e-12)
+    check_surface(surface.points, surface.triangles)
+    assert surface.remarks == (f"{turn.sum()} triangles are flipped to agree with their neighbours",)
+    surface = mend(points, faces[:, ::-1], "box")
+    assert signed_volume(surface.points, surface.triangles) == pytest.approx(1.0, rel=1e-12)
+    assert surface.remarks == ("the surface was inverted and has been flipped",)
 
 
 def test_moebius_bands_are_refused():
@@ -50,18 +50,18 @@ def test_only_the_largest_part_stays():
     speck, lumen = box((3, 3, 3), (3.1, 3.1, 3.1)), box((0.2, 0.2, 0.2), (0.6, 0.6, 0.6))
     points, faces = together(speck, box(), (lumen[0], lumen[1][:, ::-1]))
     assert len(np.unique(part_of(faces))) == 3
-    mended = mend(points, faces, "box")
-    assert len(mended.points) == 8 and signed_volume(mended.points, mended.triangles) == pytest.approx(1.0)
+    surface = mend(points, faces, "box")
+    assert len(surface.points) == 8 and signed_volume(surface.points, surface.triangles) == pytest.approx(1.0)
     share = 100 * (6 * 0.01 + 6 * 0.16) / (6 + 6 * 0.01 + 6 * 0.16)
-    assert mended.remarks == (f"2 of 3 separate parts are left out ({share:.2g} % of the area)",)
+    assert surface.remarks == (f"2 of 3 separate parts are left out ({share:.2g} % of the area)",)
 
 
 def test_doubled_and_collapsed_triangles_go():
     points, faces = box()
     odd = np.vstack([faces, faces[3:5], faces[7:8, [0, 2, 1]], [[1, 1, 2]]])
-    mended = mend(points, odd, "box")
-    assert (mended.triangles == faces).all()
-    assert mended.remarks == ("4 triangles that were doubled or had no three corners are left out",)
+    surface = mend(points, odd, "box")
+    assert (surface.triangles == faces).all()
+    assert surface.remarks == ("4 triangles that were doubled or had no three corners are left out",)
     with pytest.raises(StudyError, match="no usable triangle"):
         mend(points, np.array([[0, 0, 1]]), "box")
 
@@ -71,9 +71,9 @@ def test_holes_are_closed_on_request():
     at_corner, at_side = (faces == 0).any(axis=1), (faces == 7).any(axis=1)
     torn = faces[~at_corner & ~at_side]
     assert len(border(mend(points, torn, "box").triangles)) > 0
-    mended = mend(points, torn, "box", holes=True)
-    assert mended.remarks == ("2 holes are closed by flat fans",)
-    check_surface(mended.points, mended.triangles)
+    surface = mend(points, torn, "box", holes=True)
+    assert surface.remarks == ("2 holes are closed by flat fans",)
+    check_surface(surface.points, surface.triangles)
     # Two corners are cut off: less than a cube of the edge of the missing triangles each.
-    assert 1.0 - 2 * 0.25**3 < signed_volume(mended.points, mended.triangles) < 1.0
+    assert 1.0 - 2 * 0.25**3 < signed_volume(surface.points, surface.triangles) < 1.0
     assert without_holes(points, faces)[2] == 0

@@ -46,19 +46,19 @@ def test_a_surface_made_before_is_filled_as_if_made_now(own_cache, monkeypatch, 
     """It is not made again for what fills it, to the bit, be the organ solid or hollow."""
     alone = organ(name, nodes)
     monkeypatch.setenv("ORGANBENCH_CACHE", str(own_cache / "other"))
-    surface, run_worker, given = organ(name, nodes, fill=False), jobs.run_worker, []
+    surface, run_worker, inputs = organ(name, nodes, fill=False), jobs.run_worker, []
 
-    def seen(recipe, arrays, limit):
-        given.append(sorted(arrays))
+    def recorded(recipe, arrays, limit):
+        inputs.append(sorted(arrays))
         return run_worker(recipe, arrays, limit)
 
-    monkeypatch.setattr(jobs, "run_worker", seen)
+    monkeypatch.setattr(jobs, "run_worker", recorded)
     filled = organ(name, nodes)
-    assert given == [["points", "triangles"]] and same(filled, alone)
+    assert inputs == [["points", "triangles"]] and same(filled, alone)
     assert (filled.points[: filled.outer_count] == surface.points).all()
 
 
-def test_a_damaged_cache_file_is_made_again_and_said(own_cache):
+def test_a_warning_names_a_damaged_cache_file_that_is_made_again(own_cache):
     first = ball(150)
     (path,) = own_cache.glob("*.npz")
     whole = path.read_bytes()
@@ -103,13 +103,13 @@ def test_the_limit_counts_work_and_not_waiting(own_cache, monkeypatch):
     assert code in process.STOPPED and stage == "asleep" and 1.5 < time.monotonic() - start < 20
 
 
-def test_stages_are_told_and_a_sign_of_life_where_one_takes_long(own_cache, monkeypatch, caplog):
+def test_the_log_has_the_stages_and_a_sign_of_life_where_one_takes_long(own_cache, monkeypatch, caplog):
     monkeypatch.setattr(process, "BEAT", 0.2)
     talker = [sys.executable, "-c", "import time; print('filling', flush=True); time.sleep(1)"]
     with caplog.at_level(logging.INFO, logger="organbench.mesher"):
         assert process.followed(talker, "body", 30.0)[:2] == (0, "filling")
-    told = [record.getMessage() for record in caplog.records]
-    assert "body: filling" in told and any(line.startswith("body: filling, for ") for line in told)
+    messages = [record.getMessage() for record in caplog.records]
+    assert "body: filling" in messages and any(line.startswith("body: filling, for ") for line in messages)
 
 
 def test_a_mesher_that_dies_is_reported(own_cache):

@@ -29,9 +29,9 @@ def test_canal_is_the_smallest_distance_to_its_spheres():
         at = (1 - s)[:, None, None] * at[:, :-1] + s[:, None, None] * at[:, 1:]
     at = at[:, 0]
     brute = (np.linalg.norm(x[:, None] - at[:, :3], axis=2) - at[:, 3]).min(axis=1)
-    found = canal(x, spheres)
+    distance = canal(x, spheres)
     # Sampling misses the minimum by curvature * spacing^2 / 8, some 1e-7 here, and never lies below it.
-    assert (found <= brute + 1e-12).all() and (brute - found).max() < 1e-6
+    assert (distance <= brute + 1e-12).all() and (brute - distance).max() < 1e-6
 
 
 def test_canal_of_no_point_is_empty():

@@ -156,13 +156,13 @@ def test_octant_is_an_eighth_of_a_ball_graded_to_its_pole(sizes):
         assert len(mesh.patches[name]) > 5 and (mesh.points[mesh.patches[name], axis] == 0.0).all()
     on_sphere = np.linalg.norm(mesh.points[mesh.patches["sphere"]], axis=1)
     assert np.abs(on_sphere - RADIUS).max() < 1e-16
-    known = np.unique(np.concatenate(list(mesh.patches.values())))
-    assert (known == np.arange(mesh.surface_count)).all()
+    in_patches = np.unique(np.concatenate(list(mesh.patches.values())))
+    assert (in_patches == np.arange(mesh.surface_count)).all()
     assert mesh.volume == pytest.approx(np.pi / 6 * RADIUS**3, rel=0.5 * (h / RADIUS) ** 2)
     edges = mesh.points[unique_edges(mesh.triangles)]
     length = np.linalg.norm(edges[:, 0] - edges[:, 1], axis=1)
     from_pole = np.linalg.norm(edges.mean(axis=1) - [0, 0, RADIUS], axis=1)
-    # Mesh edges scatter by a third around the wanted size, which grows linearly away from the pole.
+    # Mesh edges scatter by a third around the target size, which grows linearly away from the pole.
     assert np.median(length[from_pole < 2 * h_pole]) == pytest.approx(h_pole + (h - h_pole) * h_pole / RADIUS, rel=0.4)
     assert np.median(length[from_pole > 0.9 * RADIUS]) == pytest.approx(h, rel=0.4)
 

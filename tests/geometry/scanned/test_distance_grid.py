@@ -21,7 +21,7 @@ def test_distance_to_a_box_is_the_closed_form():
     error = np.abs(grid.values.ravel() - exact)
     near = np.abs(exact) < BAND * CELL
     assert error[near].max() < 1e-12
-    # Farther out a neighbour of the nearest triangle may be measured, half a cell beside it: 0.5² / 8 of a cell.
+    # Farther out the distance may be that to a neighbour of the nearest triangle, half a cell away: 0.5² / 8 of a cell.
     assert error.max() < 0.03 * CELL
     assert (grid.low <= -1.0).all() and (grid.high >= 2.0).all()
 

@@ -1,4 +1,4 @@
-"""Real organs: every surface beside the project becomes a body of 550 nodes that is near to it."""
+"""Real organs: every surface in shared/meshes becomes a body of 550 nodes that is near to it."""
 
 import json
 import warnings
@@ -100,14 +100,14 @@ def test_without_nodes_the_triangles_stay(block):
         scan(path, unit="mm", smooth=0.002)
 
 
-def test_every_change_to_a_surface_is_said(block, tmp_path):
+def test_warnings_name_every_change_to_a_surface(block, tmp_path):
     _, points, faces = block
     speck = box((90, 90, 90), (95, 95, 95))
     both = together((points, faces[:, ::-1]), speck)
-    with pytest.warns(UserWarning, match="inverted") as told:
+    with pytest.warns(UserWarning, match="inverted") as records:
         mesh = scan(write(tmp_path / "odd.stl", *both), 200, unit="mm", fill=False)
-    said = [str(warning.message) for warning in told]
-    assert any("odd.stl: 1 of 2 separate parts are left out (1" in text for text in said)
+    messages = [str(warning.message) for warning in records]
+    assert any("odd.stl: 1 of 2 separate parts are left out (1" in text for text in messages)
     assert mesh.volume == pytest.approx(volume_of(block), rel=0.04)
 
 
@@ -124,7 +124,7 @@ def test_a_surface_that_crosses_itself_becomes_a_body(block, tmp_path):
 
 
 @pytest.mark.filterwarnings("ignore:.*(is missing from the mesh|has a part here that the)")
-def test_handles_are_kept_and_told(tmp_path):
+def test_handles_are_kept_and_a_warning_counts_them(tmp_path):
     round_it, round_tube = 24, 12
     i, j = (grid.ravel() for grid in np.meshgrid(np.arange(round_it), np.arange(round_tube), indexing="ij"))
     a, b = 2 * np.pi * i / round_it, 2 * np.pi * j / round_tube
@@ -141,18 +141,18 @@ def test_handles_are_kept_and_told(tmp_path):
     assert mesh.volume == pytest.approx(signed_volume(points * MM, faces), rel=1e-3) and mesh.losses["handles"] == 1
 
 
-def test_a_thin_flap_is_kept_or_told(tmp_path):
+def test_a_thin_flap_is_kept_or_a_warning_names_it(tmp_path):
     """A plate of 3 mm on an egg: a third of it is thinner than the cells of the first grid."""
     egg = split(*box((-1, -1, -1), (1, 1, 1)), times=4)
     points = egg[0] * (30, 25, 20) / np.linalg.norm(egg[0], axis=1, keepdims=True)
     near = (np.abs(points[:, 2]) < 2.6) & (points[:, 1] > 10)
     points[near, 1] += 15 * np.clip(1 - (np.abs(points[near, 0]) / 12) ** 4, 0, 1)  # pulled out to a flap
     path = write(tmp_path / "flap.vtu", points, egg[1])
-    with warnings.catch_warnings(record=True) as said:
+    with warnings.catch_warnings(record=True) as records:
         warnings.simplefilter("always")
         mesh = scan(path, 550, unit="mm", fill=False)
     far = mesh.losses["file_to_mesh"]
-    assert far["max"] < 0.02 * mesh.losses["diagonal"] or any("up to" in str(w.message) for w in said)
+    assert far["max"] < 0.02 * mesh.losses["diagonal"] or any("up to" in str(w.message) for w in records)
     assert far["max"] < 0.5 * 15e-3, "the flap is there"
     assert mesh.volume == pytest.approx(signed_volume(points * MM, egg[1]), rel=1e-3)
 

@@ -32,8 +32,8 @@ def capsule(tmp_path_factory):
     ]
     points, both = together((OUTER, faces), ((AXES - 0.5) * UNIT, faces[:, ::-1]))
     half = faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
-    known = {tuple(edge) for edge in half.tolist()}
-    rim = np.array([edge for edge in half.tolist() if (edge[1], edge[0]) not in known])
+    edges = {tuple(edge) for edge in half.tolist()}
+    rim = np.array([edge for edge in half.tolist() if (edge[1], edge[0]) not in edges])
     i, j, n = rim[:, 0], rim[:, 1], len(OUTER)
     lips = np.vstack([np.column_stack([j, i, i + n]), np.column_stack([j, i + n, j + n])])
     used, faces = np.unique(np.vstack([both, lips]), return_inverse=True)
@@ -41,10 +41,10 @@ def capsule(tmp_path_factory):
 
 
 @pytest.mark.filterwarnings("ignore:.*the mesh has a part here that the file does not")
-def test_a_capsule_is_found_and_the_way_out_works(capsule):
-    found = {finding.code: finding for finding in examine(capsule, unit="mm").findings}
-    assert "0.49 mm thick" in found["shell"].sentence or "0.5 mm thick" in found["shell"].sentence
-    assert "--solid" in found["shell"].mend
+def test_a_capsule_is_a_finding_and_the_way_out_works(capsule):
+    findings = {finding.code: finding for finding in examine(capsule, unit="mm").findings}
+    assert "0.49 mm thick" in findings["shell"].sentence or "0.5 mm thick" in findings["shell"].sentence
+    assert "--solid" in findings["shell"].mend
     body = scan(capsule, solid=0.008, **FLAT)
     check_surface(body.points, body.triangles)
     assert body.volume == pytest.approx(VOLUME, rel=0.04) and body.losses["volume_file"] == pytest.approx(
@@ -62,7 +62,7 @@ def test_a_surface_with_a_hole_is_filled_too(tmp_path):
     assert scan(path, solid=0.015, **FLAT).volume == pytest.approx(VOLUME, rel=0.04)
 
 
-def test_what_encloses_nothing_is_told(tmp_path):
+def test_a_surface_that_encloses_nothing_is_refused(tmp_path):
     faces = BALL[1][OUTER[BALL[1]].mean(axis=1)[:, 2] < -5]  # a bowl
     path = stored(tmp_path / "bowl.ply", OUTER, faces)
     with pytest.raises(StudyError, match=r"bowl: the surface encloses nothing when openings up to 3 mm are closed"):

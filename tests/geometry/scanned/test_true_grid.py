@@ -55,7 +55,7 @@ def test_a_hollow_scan_has_a_wall_on_its_true_shape(egg, mesh_cache):
 
 
 def test_two_surfaces_are_two_shapes(egg, tmp_path, mesh_cache):
-    """Curving is cached by what decides it: the same flat mesh on another shape is curved anew."""
+    """The cache of curved meshes has the shape in its key: another shape curves the same flat mesh again."""
     source = Source(egg[0], "mm")
     mesh = scan(source, 150, on_shape=True)
     one, other = (curved(mesh, shape=true_shape_of(source, smooth=smooth)) for smooth in (0.0, 0.004))

@@ -54,9 +54,9 @@ def test_boxes_that_touch_are_found_once():
     low = generator.uniform(0, 1, (257, 3))
     high = low + generator.uniform(0, 0.2, (257, 3)) ** 2
     high[7] = low[7] + 1.0  # one that touches many
-    found = np.concatenate(list(overlapping_boxes(low, high)))
+    overlaps = np.concatenate(list(overlapping_boxes(low, high)))
     pairs = [p for p in combinations(range(257), 2) if (low[list(p)].max(axis=0) <= high[list(p)].min(axis=0)).all()]
-    assert sorted(map(tuple, found.tolist())) == pairs
+    assert sorted(map(tuple, overlaps.tolist())) == pairs
 
 
 @pytest.mark.parametrize("turn", [np.eye(3), ROT])
@@ -124,13 +124,13 @@ def test_random_triangles_against_brute_force():
     generator = np.random.default_rng(3)
     points = generator.uniform(0, 1, (120, 3))
     faces = np.arange(120).reshape(-1, 3)
-    found = {tuple(p) for p in crossing_triangles(points, faces).tolist()}
+    crossings = {tuple(p) for p in crossing_triangles(points, faces).tolist()}
     expected = set()
     for i, j in combinations(range(40), 2):
         a, b = points[faces[i]], points[faces[j]]
         if any(pierces(p, q, t) for s, t in ((a, b), (b, a)) for p, q in ((s[0], s[1]), (s[1], s[2]), (s[2], s[0]))):
             expected.add((i, j))
-    assert found == expected and len(found) > 20
+    assert crossings == expected and len(crossings) > 20
 
 
 def pierces(p, q, t):

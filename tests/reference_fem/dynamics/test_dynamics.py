@@ -44,11 +44,11 @@ class Mode:
         rate, omega = 0.5 * damping, np.sqrt(self.omega**2 - 0.25 * damping**2)
         wave = self.omega / omega * np.exp(complex(-rate, omega) * moment.t)
         swings = [(complex(-rate, omega) ** k * wave).imag for k in range(3)]
-        found = (moment.u, moment.v, moment.a)
+        fields = (moment.u, moment.v, moment.a)
         return [
             np.linalg.norm(f / (self.size * self.omega**k) - s / self.omega**k * self.shape)
             / np.linalg.norm(self.shape)
-            for k, (f, s) in enumerate(zip(found, swings, strict=True))
+            for k, (f, s) in enumerate(zip(fields, swings, strict=True))
         ]
 
 
@@ -68,7 +68,7 @@ def test_displacement_velocity_and_acceleration_are_of_second_order(mode, dampin
 def test_the_pressure_is_of_second_order_too(mode):
     """Against the mode's own pressure at a step four times finer; a multiplier that rings would not converge."""
     p = [mode.path(steps, 0.0)[-1].p for steps in (20, 40, 160)]
-    errors = [np.linalg.norm(found - p[2]) for found in p[:2]]
+    errors = [np.linalg.norm(coarse - p[2]) for coarse in p[:2]]
     # the fine solution's own error, a 16th of the second, moves the order by 0.1
     assert np.log2(errors[0] / errors[1]) == pytest.approx(2.0, abs=0.25)
     assert errors[1] < 0.02 * np.linalg.norm(p[2])
@@ -205,16 +205,16 @@ def test_two_runs_agree_bitwise(mode):
 
 
 @pytest.mark.parametrize(
-    ("given", "message"),
+    ("settings", "message"),
     [
         ({"dt": 0.0}, "time step is 0"),
         ({"damping": -1.0}, "damping is -1"),
         ({"rho_inf": 1.2}, "rho_inf is 1.2"),
     ],
 )
-def test_settings_out_of_range_are_refused(given, message):
+def test_settings_out_of_range_are_refused(settings, message):
     with pytest.raises(SolveError, match=message):
-        DynamicsSettings(**given)
+        DynamicsSettings(**settings)
 
 
 def test_what_cannot_move_is_refused():

@@ -238,11 +238,11 @@ def test_a_start_on_another_mesh_is_refused():
         motion_path(Problem(block((2, 1, 1)), MATERIAL, held, density=1.0), (1.0,), start=start)
 
 
-def test_moments_are_seen_as_they_are_found():
-    seen = []
+def test_each_moment_is_passed_on_when_it_is_solved():
+    moments = []
     held = [PrescribedDisplacement(lambda x: x[2] < 1e-9)]
     problem = Problem(block((1, 1, 1)), MATERIAL, held, gravity=(0.0, 0.0, -0.1), density=1.0)
-    path = motion_path(problem, (0.0, 0.1), DynamicsSettings(), on_step=seen.append)
-    assert seen == path
+    path = motion_path(problem, (0.0, 0.1), DynamicsSettings(), on_step=moments.append)
+    assert moments == path
     assert path[0].t == 0.0
     assert not path[0].u.any()

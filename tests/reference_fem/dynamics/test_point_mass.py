@@ -28,9 +28,9 @@ def beam(mass: float, gravity: float = G) -> Problem:
 
 
 def test_the_holder_carries_the_weight_of_what_hangs():
-    found = equilibrium_path(beam(0.05), (1.0,))[-1]
+    state = equilibrium_path(beam(0.05), (1.0,))[-1]
     weight = (0.05 + 1070.0 * 0.1 * 0.03**2) * G
-    assert found.held_force[0, 2] == pytest.approx(weight, rel=1e-6)
+    assert state.held_force[0, 2] == pytest.approx(weight, rel=1e-6)
 
 
 def test_a_heavy_tip_swings_as_a_mass_on_a_spring():

@@ -132,12 +132,14 @@ def test_follower_stiffness_is_the_derivative_of_the_pressure_force(pressed):
 def test_direction_solves_the_bordered_system(pressed):
     """Residual and lumen volume at x + s d vanish to first order in s: (1 - s) of the residual is left."""
     system, x, _ = pressed
-    found = system.evaluate(x, loads(system))
-    d = Tangent(system, found).newton(0.0 * x[system.pattern.held])
+    evaluation = system.evaluate(x, loads(system))
+    d = Tangent(system, evaluation).newton(0.0 * x[system.pattern.held])
     ahead, behind = (system.evaluate(x + s * d, loads(system)).residual for s in (STEP, -STEP))
     slope = (ahead - behind) / (2 * STEP)
     rows = np.append(system.pattern.free, system.field_count)
-    np.testing.assert_allclose(slope[rows], -found.residual[rows], rtol=0.0, atol=1e-6 * np.abs(found.residual).max())
+    np.testing.assert_allclose(
+        slope[rows], -evaluation.residual[rows], rtol=0.0, atol=1e-6 * np.abs(evaluation.residual).max()
+    )
 
 
 def test_pressure_of_a_thick_sphere_filled_by_volume():
@@ -156,10 +158,10 @@ def test_filling_goes_past_the_pressure_maximum():
     stretches = np.array([1.2, 1.4, 1.7, 2.0])
     problem = filled_octant(4, 1, inner=0.8, volume=lambda t: t**3)
     path = equilibrium_path(problem, stretches, NewtonSettings(start=1.0))
-    found = [state.cavity_pressure[0] for state in path]
+    pressures = [state.cavity_pressure[0] for state in path]
     expected = [exact.thick_sphere_pressure(1.0, 0.8, 1.0, stretch) for stretch in stretches]
     assert max(expected) > expected[-1]
-    np.testing.assert_allclose(found, expected, rtol=0.015)  # one layer leaves 0.2 to 0.9 %, more as the wall thins
+    np.testing.assert_allclose(pressures, expected, rtol=0.015)  # one layer leaves 0.2 to 0.9 %, more as the wall thins
 
 
 def test_a_prescribed_pressure_gives_the_volume_of_the_closed_form():

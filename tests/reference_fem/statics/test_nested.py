@@ -70,8 +70,8 @@ def test_each_node_gets_the_field_of_its_own_element(straight):
     """A field that no single polynomial is."""
     coarse, fine = straight
     u = np.random.default_rng(2).normal(size=nodes(coarse).shape)
-    wanted = Evaluator(coarse).displacement(u, nodes(fine))
-    np.testing.assert_allclose(onto(coarse, fine).displacement(u), wanted, rtol=0, atol=1e-12)
+    expected = Evaluator(coarse).displacement(u, nodes(fine))
+    np.testing.assert_allclose(onto(coarse, fine).displacement(u), expected, rtol=0, atol=1e-12)
 
 
 @pytest.fixture(scope="module")
@@ -83,8 +83,8 @@ def round_pair():
 def test_a_curved_mesh_passes_a_linear_displacement_on(round_pair):
     coarse, fine = round_pair
     turned = lambda mesh: nodes(mesh) @ np.array([[0.1, 0.2, -0.3], [0.0, 0.4, 0.1], [0.2, 0.0, -0.1]])  # noqa: E731
-    found = onto(coarse, fine).displacement(turned(coarse))
-    np.testing.assert_allclose(found, turned(fine), rtol=0, atol=1e-12)
+    field = onto(coarse, fine).displacement(turned(coarse))
+    np.testing.assert_allclose(field, turned(fine), rtol=0, atol=1e-12)
 
 
 def test_the_functions_of_a_transfer_are_a_partition_of_one(round_pair):
@@ -103,9 +103,9 @@ def pressed(mesh):
 @pytest.fixture(scope="module")
 def coarse_end(round_pair):
     """The coarse ball at the end of its path."""
-    found = []
-    equilibrium_path(pressed(round_pair[0]), (DEEP / 2, DEEP), STRICT, on_checkpoint=found.append)
-    return System(pressed(round_pair[0]), STRICT), found[-1].state
+    checkpoints = []
+    equilibrium_path(pressed(round_pair[0]), (DEEP / 2, DEEP), STRICT, on_checkpoint=checkpoints.append)
+    return System(pressed(round_pair[0]), STRICT), checkpoints[-1].state
 
 
 @pytest.fixture(scope="module")
@@ -147,17 +147,17 @@ def as_it_presses(system, state):
 def test_a_carried_state_is_that_of_the_coarse_mesh(start, coarse_end, round_pair):
     """Held unknowns have the values that they are held at, contact points the pressure of their nearest neighbour."""
     system, state = start
-    coarse, found = coarse_end
+    coarse, coarse_state = coarse_end
     fine_nodes = nodes(round_pair[1])
     inside = np.linalg.norm(fine_nodes, axis=1) < 0.9
-    there = Evaluator(round_pair[0]).displacement(displacement(coarse, found), fine_nodes[inside])
+    there = Evaluator(round_pair[0]).displacement(displacement(coarse, coarse_state), fine_nodes[inside])
     free = np.abs(fine_nodes[inside]) > 1e-9
     np.testing.assert_allclose(displacement(system, state)[inside][free], there[free], rtol=0, atol=1e-12)
     np.testing.assert_array_equal(state.x[system.pattern.held], system.held_at(DEEP))
-    assert (state.t, state.load) == (found.t, found.load)
+    assert (state.t, state.load) == (coarse_state.t, coarse_state.load)
     near, far = (point_positions(np.zeros(len(s.surface.rest)), s.surface).reshape(-1, 3) for s in (coarse, system))
     nearest = np.array([np.argmin(((near - point) ** 2).sum(axis=1)) for point in far[::17]])
-    np.testing.assert_array_equal(state.pressure.ravel()[::17], found.pressure.ravel()[nearest])
+    np.testing.assert_array_equal(state.pressure.ravel()[::17], coarse_state.pressure.ravel()[nearest])
     assert (state.pressure > 0).any()
     touch = system.evaluate(state.x, system.loads_of(as_it_presses(system, state)), tangent=False).touch
     np.testing.assert_allclose(touch.pressure, state.pressure, rtol=1e-9, atol=1e-9 * state.pressure.max())
@@ -166,10 +166,10 @@ def test_a_carried_state_is_that_of_the_coarse_mesh(start, coarse_end, round_pai
 def test_the_equilibrium_is_that_of_a_path_from_rest_in_fewer_iterations(start, path):
     """The carried field itself is far off."""
     system, state = start
-    found = continued(system, state)
+    equilibrium = continued(system, state)
     assert apart(system, state, path[-1]) > 0.05
-    assert apart(system, found, path[-1]) < 1e-4
-    assert 1 <= found.iterations < 0.7 * sum(step.newton_iterations for step in path)
+    assert apart(system, equilibrium, path[-1]) < 1e-4
+    assert 1 <= equilibrium.iterations < 0.7 * sum(step.newton_iterations for step in path)
 
 
 PROBE, DEPTH = 0.15, 0.2
@@ -185,10 +185,10 @@ def test_a_carried_state_is_stable_under_a_probe_too(monkeypatch):
     """Its points press as on the coarse mesh, on a surface that lies elsewhere: with the pressures as multipliers they
     would press up to 26 times as hard, their tangent would not be positive definite, and Newton would take 11 steps."""
     coarse, fine = ball_octant(4), ball_octant(8)
-    found = []
-    equilibrium_path(probed(coarse), np.linspace(0.1, 1.0, 10), on_checkpoint=found.append)
+    checkpoints = []
+    equilibrium_path(probed(coarse), np.linspace(0.1, 1.0, 10), on_checkpoint=checkpoints.append)
     systems = [System(probed(mesh), NewtonSettings()) for mesh in (coarse, fine)]
-    state = carried(systems[0], found[-1].state, systems[1], onto(coarse, fine))
+    state = carried(systems[0], checkpoints[-1].state, systems[1], onto(coarse, fine))
     touch = systems[1].evaluate(state.x, systems[1].loads_of(state), tangent=False).touch
     assert touch.pressure.max() > 10 * state.pressure.max()
     few = continued(systems[1], state).iterations
@@ -205,9 +205,9 @@ def failing(monkeypatch, times):
         forces.append(more)
         if len(forces) <= times:
             raise StepFailed("made to fail")
-        found = solve_step(system, state, t, load, more)
-        iterations.append(found.iterations)
-        return found
+        equilibrium = solve_step(system, state, t, load, more)
+        iterations.append(equilibrium.iterations)
+        return equilibrium
 
     monkeypatch.setattr(nested, "solve_step", step)
     return forces, iterations
@@ -220,14 +220,14 @@ def test_where_one_step_fails_the_missing_forces_are_taken_away_little_by_little
     system, state = start
     forces, iterations = failing(monkeypatch, failures)
     missing = unbalanced(system, as_it_presses(system, state))
-    found = continued(system, state)
-    assert apart(system, found, from_rest) < 1e-4
+    equilibrium = continued(system, state)
+    assert apart(system, equilibrium, from_rest) < 1e-4
     tried = [0.0 if np.isscalar(force) else force @ missing / (missing @ missing) for force in forces]
     first = 1 - 0.5**failures
     assert tried[0] == 0.0 and tried[failures] == pytest.approx(first)
     assert tried[failures:] == pytest.approx([first - k * (1 - first) for k in range(len(tried) - failures)])
     assert tried[-1] == 0.0 and np.all(np.diff(tried[failures:]) < 0)
-    assert found.iterations == sum(iterations) and len(iterations) > 1
+    assert equilibrium.iterations == sum(iterations) and len(iterations) > 1
 
 
 def test_a_state_that_no_share_of_the_forces_helps_is_given_up(start, monkeypatch):
@@ -245,12 +245,12 @@ def heavy(mesh):
 
 
 def test_the_missing_forces_hold_a_carried_state_as_it_is(straight):
-    """Without contact, whose pressures are found anew; and without them the state moves."""
+    """Without contact, whose pressures a step solves for; and without those forces the state moves."""
     coarse, fine = straight
-    found = []
-    equilibrium_path(heavy(coarse), (1.0,), on_checkpoint=found.append)
+    checkpoints = []
+    equilibrium_path(heavy(coarse), (1.0,), on_checkpoint=checkpoints.append)
     systems = [System(heavy(mesh), NewtonSettings()) for mesh in (coarse, fine)]
-    state = carried(systems[0], found[-1].state, systems[1], onto(coarse, fine))
+    state = carried(systems[0], checkpoints[-1].state, systems[1], onto(coarse, fine))
     missing = unbalanced(systems[1], state)
     assert not missing[systems[1].pattern.held].any()
     held, moved = solve_step(systems[1], state, 1.0, 1.0, missing), continued(systems[1], state)
@@ -295,14 +295,14 @@ def test_an_inverted_element_is_made_upright(cube, kind):
     x[3 * node : 3 * node + 3] = (0.3, -0.1, 0.2)
     x[cube.displacement_count :] = 0.4
     assert len(inverted(cube, x))
-    mended = repaired(cube, x)
-    assert not len(inverted(cube, mended))
-    np.testing.assert_array_equal(mended[cube.displacement_count :], 0.4)
-    np.testing.assert_array_equal(mended[cube.pattern.held], x[cube.pattern.held])
+    upright = repaired(cube, x)
+    assert not len(inverted(cube, upright))
+    np.testing.assert_array_equal(upright[cube.displacement_count :], 0.4)
+    np.testing.assert_array_equal(upright[cube.pattern.held], x[cube.pattern.held])
     if kind == "middle":
-        assert not mended[: cube.displacement_count].any(), "it is put between its ends, and nothing else moves"
+        assert not upright[: cube.displacement_count].any(), "it is put between its ends, and nothing else moves"
     away = np.linalg.norm(rest - rest[node], axis=1) > 0.8
-    assert not mended[: cube.displacement_count].reshape(-1, 3)[away].any(), "what is far away stays"
+    assert not upright[: cube.displacement_count].reshape(-1, 3)[away].any(), "what is far away stays"
 
 
 def test_held_unknowns_stay_where_they_are_held(cube):
@@ -311,9 +311,9 @@ def test_held_unknowns_stay_where_they_are_held(cube):
     (node,) = np.flatnonzero(np.abs(rest - [1 / 3, 1 / 3, 0.0]).max(axis=1) < 1e-9)
     x[3 * node : 3 * node + 3] = (0.0, 0.0, 0.35)
     assert len(inverted(cube, x))
-    mended = repaired(cube, x)
-    np.testing.assert_array_equal(mended[cube.pattern.held], x[cube.pattern.held])
-    assert (mended != x).any()
+    upright = repaired(cube, x)
+    np.testing.assert_array_equal(upright[cube.pattern.held], x[cube.pattern.held])
+    assert (upright != x).any()
 
 
 def test_an_upright_state_is_not_touched(start):
@@ -346,11 +346,11 @@ def test_a_lumen_keeps_its_pressure_and_its_volume():
     """Without obstacles: the pressure is carried, and the finer wall gives a little."""
     coarse = hollow_cube()
     fine = MeshTet(coarse.p, coarse.t).refined()
-    found = []
-    equilibrium_path(filled(coarse), (1.0,), on_checkpoint=found.append)
+    checkpoints = []
+    equilibrium_path(filled(coarse), (1.0,), on_checkpoint=checkpoints.append)
     systems = [System(filled(mesh), NewtonSettings()) for mesh in (coarse, fine)]
-    state = carried(systems[0], found[-1].state, systems[1], onto(coarse, fine))
-    assert state.x[-1] == found[-1].state.x[-1] > 0.0 and state.pressure.shape[0] == 0
+    state = carried(systems[0], checkpoints[-1].state, systems[1], onto(coarse, fine))
+    assert state.x[-1] == checkpoints[-1].state.x[-1] > 0.0 and state.pressure.shape[0] == 0
     whole = equilibrium_path(filled(fine), (1.0,))[-1]
     ended = continued(systems[1], state)
     assert apart(systems[1], ended, whole) < 1e-5

@@ -69,11 +69,11 @@ def test_a_singular_tangent_is_a_step_that_failed(monkeypatch):
     """The first sub-step of the second interval meets it, and its halves do not."""
     plain, made = newton.Tangent, []
 
-    def once(system, found):
-        made.append(found)
+    def once(system, evaluation):
+        made.append(evaluation)
         if len(made) == first + 1:
             raise SingularTangent("the tangent matrix is singular: hold it")
-        return plain(system, found)
+        return plain(system, evaluation)
 
     first = iterations_to_the_first()
     monkeypatch.setattr(newton, "Tangent", once)
@@ -81,18 +81,18 @@ def test_a_singular_tangent_is_a_step_that_failed(monkeypatch):
 
 
 def iterations_to_the_first():
-    """Linear solves up to the first wanted time of `pulled`."""
+    """Linear solves up to the first output time of `pulled`."""
     return pulled(1.0)[0].newton_iterations
 
 
 def test_a_tangent_that_stays_singular_ends_the_path_with_what_converged(monkeypatch):
     first, plain, made = iterations_to_the_first(), newton.Tangent, []
 
-    def from_then_on(system, found):
-        made.append(found)
+    def from_then_on(system, evaluation):
+        made.append(evaluation)
         if len(made) > first:
             raise SingularTangent("the tangent matrix is singular: hold it")
-        return plain(system, found)
+        return plain(system, evaluation)
 
     monkeypatch.setattr(newton, "Tangent", from_then_on)
     with pytest.raises(SolveError, match=r"last that converged.*hold it") as caught:
@@ -193,18 +193,18 @@ def test_a_load_that_cannot_converge_keeps_what_was_reached():
     lid = PrescribedDisplacement(
         lambda x: x[2] > 1 - 1e-9, (0, 1, 2), lambda t: (0.0, 0.0, -0.1 * t if t <= 2 else -0.2 - 1.5 * (t - 2))
     )
-    seen = []
+    states = []
     problem = Problem(block((1, 1, 1)), TISSUE, [BOTTOM, lid])
     with pytest.raises(
         SolveError, match=r"no equilibrium found between t = 2\.\d+ s \(the last that converged\)"
     ) as caught:
-        equilibrium_path(problem, (1.0, 2.0, 3.0), NewtonSettings(smallest_step=1 / 16), seen.append)
+        equilibrium_path(problem, (1.0, 2.0, 3.0), NewtonSettings(smallest_step=1 / 16), states.append)
     assert [state.t for state in caught.value.converged] == [1.0, 2.0]
-    assert seen == caught.value.converged
+    assert states == caught.value.converged
 
 
 def test_a_step_that_is_too_long_is_cut():
-    """One wanted time far away: reached in several sub-steps, with the answer of an even path."""
+    """One output time far away: reached in several sub-steps, with the answer of an even path."""
     lid = PrescribedDisplacement(lambda x: x[2] > 1 - 1e-9, (0, 1, 2), lambda t: (1.2 * t, 0.0, -0.35 * t))
     problem = Problem(block((2, 2, 2)), TISSUE, [BOTTOM, lid])
     settings = NewtonSettings(max_iterations=5)

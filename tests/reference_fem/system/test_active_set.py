@@ -36,13 +36,13 @@ def first_step(problem):
     return system, loads, newton.first_guess(system, rest, loads)
 
 
-def imbalance(system, found, x, change):
+def imbalance(system, evaluation, x, change):
     """Forces left by a change in the linearised problem on the free unknowns, put together apart from the solver.
 
     Element residual and tangent without contact, and of each point w max(0, m - eps (g + n·d)) n N.
     """
     bare = system.evaluate(x, Loads(0.0, system.rows[:0], np.zeros((0, *system.surface.weights.shape))))
-    free, touch = system.pattern.free, found.touch
+    free, touch = system.pattern.free, evaluation.touch
     upper = system.pattern.upper(bare.values)
     d = change[free]
     left = bare.residual[free] + upper @ d + upper.T @ d - upper.diagonal() * d
@@ -58,30 +58,30 @@ def test_a_settled_change_solves_the_linearised_contact_problem(guessed):
 
     A flat obstacle: its tangent has no curvature that the linearised problem would leave out.
     """
-    system, loads, found = first_step(pressed("plane"))
+    system, loads, evaluation = first_step(pressed("plane"))
     x = np.zeros(system.total)
     if guessed:
         guess = np.random.default_rng(0).random(loads.multiplier.shape)
         guess[(guess < 0.7) | (point_positions(x, system.surface)[..., 2] < 0.9)] = 0.0
-        found = system.evaluate(x, loads._replace(guess=guess))
-    tangent = Tangent(system, found)
+        evaluation = system.evaluate(x, loads._replace(guess=guess))
+    tangent = Tangent(system, evaluation)
     plain = tangent.newton(np.zeros(len(system.pattern.held)))
     change, pressure, _ = active_set.settled(system, tangent, x, plain)
-    left, t, points = imbalance(system, found, x, change)
+    left, t, points = imbalance(system, evaluation, x, change)
     scale = np.sum(points.area * t)
     assert np.count_nonzero(t) > 20  # there is contact, though the tangent saw none or another
     assert np.count_nonzero((t > 0.0) != points.touching) > 20
     assert np.linalg.norm(left) < 1e-9 * scale  # round-off of a back-solve
-    assert np.linalg.norm(imbalance(system, found, x, plain)[0]) > 0.1 * scale
+    assert np.linalg.norm(imbalance(system, evaluation, x, plain)[0]) > 0.1 * scale
     np.testing.assert_allclose(pressure[points.place], t, rtol=0.0, atol=1e-9 * t.max())
 
 
 def test_the_potential_falls_with_every_share():
     """The share of a change is where the slope of the potential vanishes, or the whole."""
-    system, _, found = first_step(pressed())
+    system, _, evaluation = first_step(pressed())
     x = np.zeros(system.total)
-    tangent = Tangent(system, found)
-    points = active_set.points_near(system, found.touch, x, tangent.newton(np.zeros(len(system.pattern.held))))
+    tangent = Tangent(system, evaluation)
+    points = active_set.points_near(system, evaluation.touch, x, tangent.newton(np.zeros(len(system.pattern.held))))
     influence = active_set.Influence(system, tangent, points)
     chosen = np.flatnonzero(points.gap < 0.0)
     moves = influence.of(chosen)
@@ -111,14 +111,14 @@ def test_many_right_hand_sides_answer_like_one_by_one():
     )
     system = System(problem, NewtonSettings())
     state = system.rest()
-    found = system.evaluate(state.x, Loads(0.0, system.rows, state.multiplier, system.filling_at(0.0, 1.0)))
-    tangent = Tangent(system, found)
+    evaluation = system.evaluate(state.x, Loads(0.0, system.rows, state.multiplier, system.filling_at(0.0, 1.0)))
+    tangent = Tangent(system, evaluation)
     forces = np.random.default_rng(1).standard_normal((len(system.pattern.free), 3))
     together = tangent.respond(forces)
     for column, force in zip(together.T, forces.T, strict=True):
         np.testing.assert_allclose(column, tangent.respond(force), rtol=0.0, atol=1e-9 * np.abs(together).max())
-    volume_change = found.gradients @ together[: system.field_count]
-    scale = np.abs(found.gradients).sum() * np.abs(together).max()
+    volume_change = evaluation.gradients @ together[: system.field_count]
+    scale = np.abs(evaluation.gradients).sum() * np.abs(together).max()
     assert np.abs(volume_change).max() < 1e-9 * scale
     assert np.abs(together[-1]).max() > 0.0  # the pressure of the lumen took part
 

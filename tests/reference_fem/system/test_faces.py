@@ -75,10 +75,10 @@ def potential(system, x, loads):
 
 def test_the_residual_is_the_gradient_of_the_potential(system, state):
     x, direction, loads = state
-    found = system.evaluate(x, loads)
-    assert (found.faces.pressure > 0).all() and len(system.faces.dofs) in (2, 4)
+    evaluation = system.evaluate(x, loads)
+    assert (evaluation.faces.pressure > 0).all() and len(system.faces.dofs) in (2, 4)
     ends = [potential(system, x + side * STEP * direction, loads) for side in (-1, 1)]
-    assert found.residual @ direction == pytest.approx((ends[1] - ends[0]) / (2 * STEP), rel=AGREES)
+    assert evaluation.residual @ direction == pytest.approx((ends[1] - ends[0]) / (2 * STEP), rel=AGREES)
 
 
 def test_the_tangent_is_the_gradient_of_the_residual(system, state):
@@ -96,9 +96,9 @@ def test_slopes_of_gaps_by_finite_differences(system, state):
 @pytest.mark.parametrize("wrong", ["curvature", "slope"])
 def test_a_wrong_derivative_is_noticed(system, state, wrong, monkeypatch):
     x, _, loads = state
-    found = system.evaluate(x, loads)
+    evaluation = system.evaluate(x, loads)
     if wrong == "slope":
-        misfit = found.residual @ state[1]
+        misfit = evaluation.residual @ state[1]
         bare = system.evaluate(x, loads._replace(faces=np.full_like(loads.faces, 1e-9)))
         assert abs(misfit - bare.residual @ state[1]) > 1e3 * AGREES * abs(misfit)
     else:
@@ -126,9 +126,9 @@ def test_a_cut_pressed_shut_is_as_if_it_were_not(reach):
     whole, opened = cut_block((4, 4, 4), reach)
     times = (0.5, 1.0)
     truth = equilibrium_path(pressed(whole, 0.1, False), times)
-    found = equilibrium_path(pressed(opened, 0.1, True), times)
+    path = equilibrium_path(pressed(opened, 0.1, True), times)
     through = equilibrium_path(pressed(opened, 0.1, False), times[:1])
-    for one, other in zip(truth, found, strict=True):
+    for one, other in zip(truth, path, strict=True):
         assert other.held_force[1, 2] == pytest.approx(one.held_force[1, 2], rel=1e-2)
         assert other.penetration < 1e-3 * 0.1
         # Places that are in both: the copies come after, so compare by place.

@@ -89,12 +89,12 @@ def tangent_misfit(system, state, values):
 
 def test_residual_is_the_gradient_of_the_potential(system, state):
     x, direction, loads = state
-    found = system.evaluate(x, loads)
-    assert (found.touch.pressure > 0).all()
+    evaluation = system.evaluate(x, loads)
+    assert (evaluation.touch.pressure > 0).all()
     slope = (potential(system, x + STEP * direction, loads) - potential(system, x - STEP * direction, loads)) / (
         2 * STEP
     )
-    assert found.residual @ direction == pytest.approx(slope, rel=AGREES)
+    assert evaluation.residual @ direction == pytest.approx(slope, rel=AGREES)
 
 
 def test_tangent_is_the_gradient_of_the_residual(system, state):
@@ -135,17 +135,17 @@ def test_predictor_linearises_the_move_of_the_obstacles(system, state):
 def test_rest_is_stress_free(system):
     problem = Problem(bumpy(), NeoHookean(2.0, 50.0), [PrescribedDisplacement(lambda x: x[2] < 1e-9)])
     bare = System(problem, NewtonSettings())
-    found = bare.evaluate(np.zeros(bare.total), Loads(0.0, bare.rows, bare.rest().multiplier))
-    assert np.abs(found.residual).max() < 1e-15  # mu is 2 Pa, areas about 0.1 m²: round-off
+    evaluation = bare.evaluate(np.zeros(bare.total), Loads(0.0, bare.rows, bare.rest().multiplier))
+    assert np.abs(evaluation.residual).max() < 1e-15  # mu is 2 Pa, areas about 0.1 m²: round-off
 
 
 def test_an_inverted_element_stops_the_kernel(system, state):
     x, _, loads = state
     flat = x.copy()
     flat[0 : system.displacement_count : 3] = -2.0 * system.nodes[:, 0]
-    found = system.evaluate(flat, loads)
-    assert found.smallest_J < 0.0
-    assert not found.usable
+    evaluation = system.evaluate(flat, loads)
+    assert evaluation.smallest_J < 0.0
+    assert not evaluation.usable
 
 
 def test_two_evaluations_are_bitwise_equal(system, state):

@@ -147,10 +147,10 @@ def test_missing_fast_solver_is_mentioned_once(monkeypatch):
     monkeypatch.setattr(builtins, "__import__", without_pardiso)
     linear.load_pardiso.cache_clear()
     try:
-        with pytest.warns(SlowSolverWarning, match="pypardiso") as told:
+        with pytest.warns(SlowSolverWarning, match="pypardiso") as records:
             assert isinstance(linear.SymmetricSolver().factors, linear.ScipyFactors)
             linear.SymmetricSolver()
-        assert len(told) == 1
+        assert len(records) == 1
         with pytest.raises(SolveError, match="use 'auto'"):
             linear.SymmetricSolver("pardiso")
     finally:

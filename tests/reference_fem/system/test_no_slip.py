@@ -106,10 +106,10 @@ def test_force_of_stuck_points_is_the_gradient_of_the_potential(gripped):
 
 def test_tangent_of_stuck_points(gripped):
     system, x, direction, loads = gripped
-    found, free = system.evaluate(x, loads), system.pattern.free
+    evaluation, free = system.evaluate(x, loads), system.pattern.free
     d = direction.copy()
     d[system.pattern.held] = 0.0
-    upper = system.pattern.upper(found.values)
+    upper = system.pattern.upper(evaluation.values)
     product = upper @ d[free] + upper.T @ d[free] - upper.diagonal() * d[free]
     ahead, behind = (system.evaluate(x + s * d, loads).residual[free] for s in (STEP, -STEP))
     expected = (ahead - behind) / (2 * STEP)
