@@ -20,5 +20,5 @@ def real_surface(name):
     """Path of a real surface; skips the test where it is absent."""
     path = FOLDER / f"{name}.ply"
     if not path.exists():
-        pytest.skip(f"the real surface {path.name} is not beside the project (shared/meshes)")
+        pytest.skip(f"the real surface {path.name} is not in shared/meshes next to the project")
     return path

@@ -51,8 +51,8 @@ def mirrored_block() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     other = np.where(flat, np.arange(len(points)), len(points) + np.cumsum(~flat) - 1)
     cells = np.vstack([cells, other[cells][:, [0, 2, 1, 3]]])
     points = np.vstack([points, points[~flat] * [-1, 1, 1] + [0.08, 0, 0]])
-    known, _, second = tetrahedron_faces(cells)
-    faces = known.astype(np.int64)[second >= 0]
+    all_faces, _, second = tetrahedron_faces(cells)
+    faces = all_faces.astype(np.int64)[second >= 0]
     faces = faces[(points[faces][:, :, 0] == 0.04).all(axis=1)]
     a, b, c = points[faces].transpose(1, 0, 2)
     turned = np.cross(b - a, c - a)[:, 0] < 0

@@ -50,11 +50,11 @@ def ball_mesh(levels: int = 1, shells=(0.55, 1.0), inner: float = 0.0) -> tuple[
     points, nodes = second_order(points, tetrahedra)
     count = int(tetrahedra.max()) + 1
     reach = np.linalg.norm(points[:count], axis=1)
-    wanted = np.zeros(len(points))
+    distance = np.zeros(len(points))
     for a, (i, j) in enumerate(PAIRS, start=4):
-        wanted[nodes[:, a]] = 0.5 * (reach[nodes[:, i]] + reach[nodes[:, j]])
+        distance[nodes[:, a]] = 0.5 * (reach[nodes[:, i]] + reach[nodes[:, j]])
     middle = points[count:]
-    points[count:] = middle * (wanted[count:] / np.linalg.norm(middle, axis=1))[:, None]
+    points[count:] = middle * (distance[count:] / np.linalg.norm(middle, axis=1))[:, None]
     return RADIUS * points, nodes
 
 

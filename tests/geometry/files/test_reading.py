@@ -159,7 +159,7 @@ def test_fill_refuses_what_it_cannot_fill(surface, tmp_path):
 def test_real_organs_become_bodies(name):
     path = REAL / f"{name}.ply"
     if not path.exists():
-        pytest.skip(f"the real surface {path.name} is not beside the project (shared/meshes)")
+        pytest.skip(f"the real surface {path.name} is not in shared/meshes next to the project")
     mesh = read_mesh(path, unit="mm")
     assert 1e-4 < mesh.volume < 2.5e-3
     body = fill(mesh)

@@ -63,8 +63,8 @@ def test_gradients_of_linear_fields_are_exact(mesh):
     points, cells = mesh
     slopes, _ = gradients(points, cells)
     assert np.abs(slopes.sum(axis=2)).max() < 1e-10 / RADIUS
-    found = np.einsum("kai,kqaj->kqij", (points @ SHEARED.T)[cells], slopes)
-    assert np.allclose(found, SHEARED, atol=1e-12)
+    deformation = np.einsum("kai,kqaj->kqij", (points @ SHEARED.T)[cells], slopes)
+    assert np.allclose(deformation, SHEARED, atol=1e-12)
 
 
 @pytest.mark.parametrize("name", MESHES)

@@ -23,8 +23,8 @@ def difference(function, x: np.ndarray, step: float):
 def test_the_gradient_of_the_volumes_is_their_difference(body):
     x, volumes = jiggled(body), volumes_of(body)
     slope, along = difference(volumes.measure, x, 1e-4 * RADIUS)
-    found = volumes.jacobian(x) @ along
-    assert np.allclose(found, slope, rtol=0, atol=1e-6 * np.abs(slope).max())
+    derivative = volumes.jacobian(x) @ along
+    assert np.allclose(derivative, slope, rtol=0, atol=1e-6 * np.abs(slope).max())
 
 
 def test_every_entry_of_the_gradient_is_that_of_its_node():

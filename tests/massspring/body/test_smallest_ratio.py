@@ -1,4 +1,4 @@
-"""The smallest volume ratio of a body's elements, against determinants of maps that are known."""
+"""The smallest volume ratio of a body's elements, against determinants of maps in closed form."""
 
 import numpy as np
 import pytest

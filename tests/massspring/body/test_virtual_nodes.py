@@ -156,9 +156,9 @@ def test_volumes_of_the_kernel_and_their_slopes_are_the_sums_over_cells(both, ki
     way, step = rng.standard_normal(x.shape), 1e-7
     slope = (body.kept.measure(x + step * way) - body.kept.measure(x - step * way)) / (2 * step)
     row = np.repeat(np.arange(body.kept.count), np.diff(state.rows.row_start.astype(int)))
-    found = np.einsum("ei,ei->e", state.rows.value[:, :3], way[state.rows.column])
+    terms = np.einsum("ei,ei->e", state.rows.value[:, :3], way[state.rows.column])
     np.testing.assert_allclose(
-        np.bincount(row, found, body.kept.count), slope, rtol=1e-6, atol=1e-6 * np.abs(slope).max()
+        np.bincount(row, terms, body.kept.count), slope, rtol=1e-6, atol=1e-6 * np.abs(slope).max()
     )
 
 

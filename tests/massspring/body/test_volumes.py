@@ -90,7 +90,7 @@ def test_volumes_that_follow_from_others_are_refused(hollow_body, name):
 
 
 def test_independent_volumes_may_be_joined(hollow_body):
-    """Regions of the wall beside the lumen; and all but one of the parts beside the whole."""
+    """Regions of the wall together with the lumen; and all but one of the parts together with the whole."""
     lumen = Volumes.closed_surfaces(hollow_body, {"lumen": hollow_surfaces()["lumen"]})
     both = Volumes.regions(hollow_body, 5).joined(lumen)
     assert both.names[-1] == "lumen"

@@ -75,7 +75,7 @@ def test_hcj05_is_the_first_newton_step_of_shake(body):
             pressures.append(setup.method.advance(setup.start(), setup.boundary(0)).lam[0])
         gaps.append(abs(pressures[0] - pressures[1]))
     assert gaps[0] > 1e-6
-    # vᵀHv stays as dt goes to 0; what is left beside it goes down with dt.
+    # vᵀHv stays as dt goes to 0; the rest falls with dt.
     assert gaps[1] - gaps[2] == pytest.approx(0.5 * (gaps[0] - gaps[1]), rel=0.2)
 
 

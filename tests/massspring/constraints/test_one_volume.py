@@ -65,8 +65,8 @@ def test_the_multiplier_equals_the_full_saddle_point_solve(ball_body):
     nodes.v_star[net.held_nodes] = [0.02, 0.0, -0.01]
     touched = np.array([40, 41, 90])
     approach = activate(contacts, touched, rng)
-    wanted = 1.02 * body.volume
-    error = wanted - volume_gradient_into(nodes.x, net.triangles, nodes.gradient)
+    target = 1.02 * body.volume
+    error = target - volume_gradient_into(nodes.x, net.triangles, nodes.gradient)
     lam, _ = volume_multiplier(nodes, contacts, net.inverse_mass, error, dt)
 
     n = 3 * body.node_count

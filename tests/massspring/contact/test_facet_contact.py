@@ -1,4 +1,4 @@
-"""Contact at points inside facets: balance, depth, wide contacts, energy, and what holds beside it."""
+"""Contact at points inside facets: balance, depth, wide contacts, energy, and release."""
 
 from functools import cache
 

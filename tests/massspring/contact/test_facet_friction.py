@@ -22,7 +22,7 @@ from tests.massspring.contact.test_facet_contact import EDGE, FRICTION, HELD, IN
 from tests.massspring.quadratic import RADIUS, quadratic_block
 
 CREEP = 5e-5
-"""Of the block in 0.6 s [m]: points that lose and find the plane again are held anew."""
+"""Of the block in 0.6 s [m]: points that lose the plane and touch it again stick at a new place."""
 
 
 WEAK = 2.0

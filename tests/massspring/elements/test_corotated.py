@@ -46,8 +46,7 @@ def solid():
 def elements(solid):
     """With targets that differ from volume to volume."""
     filling = 1.0 + 0.1 * np.random.default_rng(0).standard_normal(solid.kept.count)
-    found = elements_of(solid, BULK)
-    return found._replace(target_ratio=target_ratios(solid, filling))
+    return elements_of(solid, BULK)._replace(target_ratio=target_ratios(solid, filling))
 
 
 def nearest(f):
@@ -57,7 +56,7 @@ def nearest(f):
 
 
 def stress_free(seed, inverted=False):
-    """A random F with det F of the wanted sign."""
+    """A random F with det F of the chosen sign."""
     f = np.random.default_rng(seed).standard_normal((3, 3))
     return f if (np.linalg.det(f) < 0) == inverted else f * np.array([-1.0, 1.0, 1.0])
 
@@ -82,12 +81,12 @@ def stiffness(body, elements, x, exact):
     add_corotated_stiffness(elements, pattern.places, x, 1.0, exact, data)
     order = (3 * pattern.free[:, None] + np.arange(3)).ravel()
     own = csr_array((data, pattern.indices, pattern.indptr), shape=(len(order), len(order))).toarray()
-    found = np.zeros_like(own)
-    found[np.ix_(order, order)] = own
+    matrix = np.zeros_like(own)
+    matrix[np.ix_(order, order)] = own
     for (i, j), k in zip(body.springs.ends, body.springs.stiffness, strict=True):
         for a, b, sign in ((i, i, 1), (j, j, 1), (i, j, -1), (j, i, -1)):
-            found[3 * a : 3 * a + 3, 3 * b : 3 * b + 3] += sign * k * np.eye(3)
-    return found
+            matrix[3 * a : 3 * a + 3, 3 * b : 3 * b + 3] += sign * k * np.eye(3)
+    return matrix
 
 
 @pytest.mark.parametrize("inverted", [False, True])
@@ -102,7 +101,7 @@ def test_the_rotation_is_the_nearest_proper_one(inverted):
         assert np.array(r).reshape(3, 3) == pytest.approx(expected, abs=1e-13 * (s[0] / gap) ** 2 + 1e-13)
 
 
-def test_a_rotation_that_is_not_defined_is_told():
+def test_a_rotation_that_is_not_unique_is_undefined():
     """Flat to a line, or a reflection: two rotations are equally near."""
     for f in (np.zeros((3, 3)), np.diag([1.0, 0.0, 0.0]), np.diag([1.0, 1.0, -1.0])):
         assert not rotation(tuple(f.ravel()))[2]
@@ -239,7 +238,7 @@ def test_explicit_and_implicit_agree_at_rest(solid):
     assert forces[0] == pytest.approx(forces[1], rel=1e-4) and forces[0] < 0
 
 
-def test_what_it_cannot_do_is_said(solid):
+def test_what_it_cannot_do_is_refused(solid):
     for method in METHODS:
         for body, words in (
             (curved_solid(contact="nodes"), "no quadratic body, its corotated elements are linear"),

@@ -25,8 +25,7 @@ def solid(request):
 def elements(solid):
     """With targets that differ from volume to volume."""
     filling = 1.0 + 0.1 * np.random.default_rng(0).standard_normal(solid.kept.count)
-    found = elements_of(solid, BULK)
-    return found._replace(target_ratio=target_ratios(solid, filling))
+    return elements_of(solid, BULK)._replace(target_ratio=target_ratios(solid, filling))
 
 
 def energy(body, elements, x):
@@ -59,9 +58,9 @@ def test_forces_are_minus_the_gradient_of_the_energy(solid, elements):
 
 
 def test_rest_is_balanced(solid):
-    found = elements_of(solid, BULK)
-    pull = np.abs(force(solid, found._replace(constants=np.zeros(3)), solid.rest)).max()
-    assert np.abs(force(solid, found, solid.rest)).max() < 1e-12 * pull
+    elements = elements_of(solid, BULK)
+    pull = np.abs(force(solid, elements._replace(constants=np.zeros(3)), solid.rest)).max()
+    assert np.abs(force(solid, elements, solid.rest)).max() < 1e-12 * pull
 
 
 def test_turning_a_body_turns_its_forces(solid, elements):

@@ -151,7 +151,7 @@ def test_what_loses_its_place_stops_the_run(solid):
     stops(Setup(solid, ExplicitElements(), clock, (), (held,)), "attachment 0 is no longer finite", 3)
 
 
-def test_what_it_cannot_do_is_said(block_body):
+def test_what_it_cannot_do_is_refused(block_body):
     with pytest.raises(MassSpringError, match="its springs must have no length; take law 'cotangent'"):
         Setup(block_body, ExplicitElements(), Clock(0.01, 1, 10))
     with pytest.raises(MassSpringError, match=r"bulk_ratio is 0\.0 mu; it must be positive"):

@@ -179,7 +179,7 @@ def test_what_loses_its_place_or_its_numbers_stops_the_run(solid):
     stops(Setup(solid, ImplicitElements(), clock, velocity=v), "", 0)
 
 
-def test_what_it_cannot_do_is_said(block_body):
+def test_what_it_cannot_do_is_refused(block_body):
     def refused(body, words):
         with pytest.raises(MassSpringError, match=words):
             Setup(body, ImplicitElements(), Clock(0.01, 1, 1))

@@ -52,13 +52,13 @@ def constraints(elements, x):
 
 def slopes(elements, x):
     """∂C/∂x by central differences [1/m], (2, n, 3)."""
-    found, step = np.zeros((2, *x.shape)), 1e-6 * np.ptp(x)
+    jacobian, step = np.zeros((2, *x.shape)), 1e-6 * np.ptp(x)
     for i in elements.node[0]:
         for axis in range(3):
             near = np.zeros_like(x)
             near[i, axis] = step
-            found[:, i, axis] = (constraints(elements, x + near) - constraints(elements, x - near)) / (2 * step)
-    return found
+            jacobian[:, i, axis] = (constraints(elements, x + near) - constraints(elements, x - near)) / (2 * step)
+    return jacobian
 
 
 def relaxed(one):
@@ -148,7 +148,7 @@ def test_targets_of_volumes_are_followed(solid):
     assert grown == pytest.approx(1.03, abs=2e-3)
 
 
-def test_what_it_cannot_do_is_said(solid, block_body):
+def test_what_it_cannot_do_is_refused(solid, block_body):
     for body, words in (
         (block_body, "its springs must have no length"),
         (curved_solid(contact="nodes"), "no quadratic body, its tetrahedra are linear"),

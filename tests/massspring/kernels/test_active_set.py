@@ -47,13 +47,13 @@ def sole(block_body):
     return Sole(block_body)
 
 
-@pytest.mark.parametrize(("asked", "slips"), [(0.98 * MU, False), (1.02 * MU, True)])
-def test_a_node_sticks_up_to_what_its_friction_can_take(sole, asked, slips):
+@pytest.mark.parametrize(("impulse", "slips"), [(0.98 * MU, False), (1.02 * MU, True)])
+def test_a_node_sticks_up_to_what_its_friction_can_take(sole, impulse, slips):
     active, (first, *others) = sole.active(), sole.nodes
     impulses = np.zeros((len(active.nodes) // 3, 3))
     assert np.array_equal(active.nodes[::3], sole.nodes)
     impulses[:] = (0.1 * MU, 0.0, 1.0)
-    impulses[0] = (0.0, asked, 1.0)
+    impulses[0] = (0.0, impulse, 1.0)
     changed = sole.contact.revise(sole.end(np.zeros(3)), active, impulses.ravel())
     assert changed == slips
     assert sole.contacts.mode[first] == (SLIDES if slips else STICKS)
@@ -95,7 +95,7 @@ def test_a_slip_that_is_round_off_is_none(sole, way, sticks):
     """Just below and just above the bound: its direction would be chance, and its friction as large as any."""
     sole.slide()
     slip = np.array([0.6, -0.8, 0.0]) * way * SLIP_RESOLUTION * sole.model.correction_limit / DT
-    sole.state.nodes.x[sole.nodes] = 0.0  # so that the way is known as closely as it is asked
+    sole.state.nodes.x[sole.nodes] = 0.0  # at the origin, where positions resolve so small a way
     carried = sole.boundary.velocity[0, 0]
     carried[:] = 0.0
     end = sole.state.nodes.x.copy()

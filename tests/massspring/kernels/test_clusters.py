@@ -101,8 +101,8 @@ def test_it_saves_iterations(kept, filled_ball, bent):
     jacobian = dense(rows, len(x))
     today = np.einsum("rja,j,sja->rs", jacobian, weight, jacobian)
     diagonal_into(rows, state.contacts, weight, rows.diagonal)
-    wanted = np.random.default_rng(4).normal(size=m)
-    right, counts = today @ wanted, []
+    solution = np.random.default_rng(4).normal(size=m)
+    right, counts = today @ solution, []
     for clusters in (rows.clusters, each_alone(m)):
         trial = rows._replace(clusters=clusters, lam=np.zeros(m))
         trial.right[:], trial.allowed[:] = right, 1e-6 * np.abs(right).max()

@@ -89,10 +89,10 @@ class Scene:
         find_contacts(self.model, self.state.nodes, self.contacts, self.boundary, 0, push, None)
         return self
 
-    def revise(self, lam: float, found_at: float = LAM) -> int:
+    def revise(self, lam: float, earlier: float = LAM) -> int:
         square = (self.state.nodes.gradient**2).sum(axis=1)
         mobility = float(self.model.inverse_mass @ square)
-        reach = pressure_reach(lam - found_at, mobility, self.model.largest_inverse_mass, DT)
+        reach = pressure_reach(lam - earlier, mobility, self.model.largest_inverse_mass, DT)
         push = Push(self.state.nodes.gradient, lam)
         return revise_contacts(self.model, self.state.nodes, self.contacts, self.boundary, 0, push, reach)
 
@@ -100,8 +100,8 @@ class Scene:
 def slopes(obstacle: Any, y: np.ndarray) -> np.ndarray:
     """Outward normals of an obstacle at y (n, 3), by central differences of its gap: good to 1e-6."""
     step = 1e-6 * np.eye(3)
-    found = np.stack([(obstacle.gap(y + e, DT) - obstacle.gap(y - e, DT)) / 2e-6 for e in step], axis=1)
-    return found / np.linalg.norm(found, axis=1)[:, None]
+    normals = np.stack([(obstacle.gap(y + e, DT) - obstacle.gap(y - e, DT)) / 2e-6 for e in step], axis=1)
+    return normals / np.linalg.norm(normals, axis=1)[:, None]
 
 
 @pytest.mark.parametrize("name", OBSTACLES)
@@ -112,11 +112,11 @@ def test_nodes_sit_on_the_obstacle_that_they_would_enter_deepest(shell, name):
     away = scene.contacts.mode == FREE
     assert np.abs(scene.contacts.predicted_gap - gaps.min(axis=0))[away].max() < ROUND_OFF
     assert (scene.contacts.predicted_gap[~away] == np.inf).all()
-    wanted = np.where(gaps.min(axis=0) < 0, gaps.argmin(axis=0) + 1, 0)
-    wanted[inner] = 0
-    assert (scene.contacts.contact_id == wanted).all() and len(np.unique(wanted)) == len(scene.obstacles) + 1
+    expected = np.where(gaps.min(axis=0) < 0, gaps.argmin(axis=0) + 1, 0)
+    expected[inner] = 0
+    assert (scene.contacts.contact_id == expected).all() and len(np.unique(expected)) == len(scene.obstacles) + 1
     one = np.flatnonzero(scene.contacts.mode == SLIDES)
-    ends = scene.gaps(scene.x + DT * scene.velocity(LAM))[wanted[one] - 1, one]
+    ends = scene.gaps(scene.x + DT * scene.velocity(LAM))[expected[one] - 1, one]
     assert np.abs(ends).max() < ROUND_OFF  # also beside a rod: no node here comes near its ends
 
 
@@ -201,19 +201,19 @@ def test_what_sticks_too_hard_at_the_new_pressure_slips(shell):
     k, n = scene.contacts.v_target[sticks] - u, scene.contacts.normal[sticks]
     p = (k * n).sum(axis=1)
     aside = k - p[:, None] * n
-    asked = np.linalg.norm(aside, axis=1)
-    pushed, slips = p > 0, (p > 0) & (asked > mu * p)
+    shear = np.linalg.norm(aside, axis=1)
+    pushed, slips = p > 0, (p > 0) & (shear > mu * p)
     scene.revise(lam)
     locked = scene.contacts.mode[sticks]
     assert np.array_equal(locked == SLIDES, slips) and np.array_equal(locked == STICKS, pushed & ~slips)
-    expected = u + p[:, None] * n + (mu * p / asked)[:, None] * aside
+    expected = u + p[:, None] * n + (mu * p / shear)[:, None] * aside
     assert np.abs(scene.velocity(lam)[sticks] - expected)[slips].max() < ROUND_OFF
     assert slips.sum() > 3 and (pushed & ~slips).sum() > 3 and (~pushed).sum() > 3
 
 
 @pytest.mark.parametrize("name", [name for name, several in OBSTACLES.items() if len(several[0]) == 2])
 def test_between_two_obstacles_nodes_keep_both(shell, name):
-    """n·v⁺ as beside the first alone, m·v⁺ up to the second, free along n × m; without an edge the first counts."""
+    """n·v⁺ as at the first alone, m·v⁺ up to the second, free along n × m; without an edge the first counts."""
     obstacles, box = OBSTACLES[name]
     scene, on_edge = Scene(shell, obstacles, box).find(), 0
     for first, second in ((0, 1), (1, 0)):

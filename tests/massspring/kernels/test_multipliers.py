@@ -142,7 +142,7 @@ def _single_row(nodes: int, node: int, direction: np.ndarray) -> np.ndarray:
 
 
 def test_the_whole_by_rows_is_the_whole_by_a_division(block_body):
-    """A region that is everything, beside a second volume that nothing touches, has the pressure of the division."""
+    """A region that is everything, next to a second volume that nothing touches, has the pressure of the division."""
     clock = clock_for(block_body, 10, 20)
     planes = squeeze(block_body, 0.004, clock.duration)
     one = simulate(Setup(block_body, ImplicitVolume(), clock, planes, damping=20.0))

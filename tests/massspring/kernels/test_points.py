@@ -36,8 +36,8 @@ def prepared(body: Body, held=()):
     return body.kept, state.rows, x, state.frame(setup.boundary(0))
 
 
-def close(found, exact, bound=CLOSE):
-    assert np.abs(found - exact).max() < bound * np.abs(exact).max()
+def close(value, exact, bound=CLOSE):
+    assert np.abs(value - exact).max() < bound * np.abs(exact).max()
 
 
 def test_volumes_and_pushes_are_those_of_numpy(body):

@@ -88,12 +88,12 @@ def test_any_closed_chains_have_the_area_of_their_edges(seed):
             for i, j in zip(walk, np.roll(walk, -1), strict=True):
                 chain[(edges == sorted((i, j))).all(axis=1)] += share if i < j else -share
     row, corner, share = quadrangles(csr_array(chains), edges)
-    found = np.zeros((4, 3))
+    areas = np.zeros((4, 3))
     x, u, v = x[:, :3], *x[edges.T, :3]
     np.add.at(
-        found, row, share[:, None] * np.cross(x[corner[:, 2]] - x[corner[:, 0]], x[corner[:, 3]] - x[corner[:, 1]])
+        areas, row, share[:, None] * np.cross(x[corner[:, 2]] - x[corner[:, 0]], x[corner[:, 3]] - x[corner[:, 1]])
     )
-    assert np.abs(found - chains @ np.cross(u, v)).max() < 1e-13  # some forty products of size 1
+    assert np.abs(areas - chains @ np.cross(u, v)).max() < 1e-13  # some forty products of size 1
     assert (np.diff(row) >= 0).all()
 
 
@@ -102,9 +102,9 @@ def test_a_ring_takes_half_as_many_quadrangles_as_it_has_nodes():
     points, triangles = icosphere(1)
     rows = volume_rows(Volumes(("whole",), triangles, csr_array(np.ones((1, len(triangles))))), len(points))
     neighbours = np.bincount(triangles.ravel())
-    wanted = np.empty_like(neighbours)
-    wanted[rows.column[rows.target[:, 0]]] = np.diff(rows.ring_start.astype(np.int64))
-    assert set(neighbours) == {5, 6} and np.array_equal(wanted, (neighbours - 1) // 2)
+    counts = np.empty_like(neighbours)
+    counts[rows.column[rows.target[:, 0]]] = np.diff(rows.ring_start.astype(np.int64))
+    assert set(neighbours) == {5, 6} and np.array_equal(counts, (neighbours - 1) // 2)
 
 
 @pytest.mark.parametrize("precision", ["float64", "float32"])
@@ -159,11 +159,11 @@ def test_volumes_inside_a_body_push_each_others_nodes_oppositely(block_body):
     pairs = np.array([(i, j) for i in range(4) for j in range(i + 1, 4)])
     edges = np.unique(np.sort(body.tetrahedra.astype(np.int64)[:, pairs].reshape(-1, 2), axis=1), axis=0)
     outer = np.sort(body.triangles.astype(np.int64)[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-    found = opposite_entries(rows, body)
+    opposite = opposite_entries(rows, body)
     spared = np.sort(rows.target[rows.target[:, 2] != rows.target[:, 0]][:, [0, 2]], axis=1)
     assert len(rows.value) - len(rows.target) == len(spared) >= len(edges) - len(np.unique(outer, axis=0))
-    assert {(p, q) for p, q in spared} <= {(p, q) for p, q in found}
-    assert np.isin(found, spared).any(axis=1).all()  # of three that are alike one goes without
+    assert {(p, q) for p, q in spared} <= {(p, q) for p, q in opposite}
+    assert np.isin(opposite, spared).any(axis=1).all()  # of three that are alike one goes without
 
 
 def test_any_numbers_of_volumes_spare_as_much(block_body):
@@ -184,6 +184,6 @@ def test_two_volumes_that_meet_in_a_node_share_its_ring(block_body):
     rows = volume_rows(Volumes.regions(block_body, 7), block_body.node_count)
     meeting = np.diff(rows.node_start.astype(np.int64))
     inside = np.setdiff1d(np.arange(block_body.node_count), block_body.surface_nodes)
-    found = opposite_entries(rows, block_body)
-    assert len(found) >= len(rows.value) - len(rows.target) >= (meeting[inside] == 2).sum() > 0
+    opposite = opposite_entries(rows, block_body)
+    assert len(opposite) >= len(rows.value) - len(rows.target) >= (meeting[inside] == 2).sum() > 0
     assert np.array_equal(np.sort(np.unique(rows.target[:, [0, 2]])), np.arange(len(rows.value)))

@@ -116,7 +116,7 @@ def touching_tetrahedra() -> Body:
 
 
 def many_neighbours(count: int) -> Body:
-    """A ball whose node 0 is joined to `count` others beside its ring, and twice to one of its ring."""
+    """A ball whose node 0 is joined to `count` others outside its ring, and twice to one of its ring."""
     points, faces, tetrahedra = block((4, 4, 4))
     body = tetrahedral_body(points, faces, tetrahedra, SOFT)
     near = set(body.springs.ends[(body.springs.ends == 0).any(axis=1)].ravel().tolist())
@@ -179,9 +179,9 @@ def test_the_multiplier_from_sums_is_the_one_over_all_nodes(ball_body):
     list_active(contacts)
     error = 0.01 * volume
     expected = volume_multiplier(nodes, contacts, net.inverse_mass, error, boundary.dt)
-    found = multiplier_of_sums(nodes, contacts, net.inverse_mass, error, boundary.dt, flow, mobility)
-    assert found == pytest.approx(expected, rel=1e-12)
-    assert found[0] != pytest.approx(
+    multiplier = multiplier_of_sums(nodes, contacts, net.inverse_mass, error, boundary.dt, flow, mobility)
+    assert multiplier == pytest.approx(expected, rel=1e-12)
+    assert multiplier[0] != pytest.approx(
         volume_multiplier(nodes, contacts, 0.9 * net.inverse_mass, error, boundary.dt)[0], rel=1e-3
     )
 

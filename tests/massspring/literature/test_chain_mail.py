@@ -56,7 +56,7 @@ def test_every_link_is_within_its_limits_after_a_far_move(block_body):
 @pytest.mark.parametrize("seed", range(3))
 def test_no_order_of_nodes_or_links_changes_the_answer(block_body, seed):
     number = np.random.default_rng(seed).permutation(block_body.node_count)
-    here, there = (displaced(block_body, ChainMail(), renumbered=given)[0] for given in (None, number))
+    here, there = (displaced(block_body, ChainMail(), renumbered=order)[0] for order in (None, number))
     assert np.abs(here - there).max() < ROUND_OFF
 
 
@@ -156,7 +156,7 @@ def test_what_is_pressed_beyond_all_links_is_counted(filled_ball):
         ({"targets": {"body": Ramp((0.0, 1.0), (1.0, 1.1))}}, "could be filled"),
     ],
 )
-def test_what_it_cannot_do_is_said(filled_ball, around, sentence):
+def test_what_it_cannot_do_is_refused(filled_ball, around, sentence):
     if "velocity" in around:
         around = {"velocity": np.full_like(filled_ball.rest, around["velocity"])}
     with pytest.raises(MassSpringError, match=sentence):

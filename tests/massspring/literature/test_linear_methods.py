@@ -154,9 +154,9 @@ def test_a_mode_rings_as_its_equation_says_whatever_the_step(solid, dt):
     history = simulate(setup, snapshots=range(1, 21))
     w = np.sqrt(state.memory.square[2] - damping**2 / 4)
     t = clock.frame * np.arange(1, 21)
-    wanted = np.exp(-damping * t / 2) * (np.cos(w * t) + damping / (2 * w) * np.sin(w * t))
+    expected = np.exp(-damping * t / 2) * (np.cos(w * t) + damping / (2 * w) * np.sin(w * t))
     moved = (history.snapshots - solid.rest).reshape(20, -1) @ shape.ravel() / (shape**2).sum()
-    assert np.abs(moved - wanted).max() < 1e-8
+    assert np.abs(moved - expected).max() < 1e-8
 
 
 def test_what_is_not_held_stays_behind_at_first(solid):
@@ -226,7 +226,7 @@ def refused(body, method, sentence, **around):
 
 
 @pytest.mark.parametrize("method", [ElasticResponse(), LinearModes()], ids=lambda method: method.name)
-def test_what_they_cannot_do_is_said(method):
+def test_what_they_cannot_do_is_refused(method):
     body = linear_solid((2, 2, 2))
     refused(body, method, "no nodes are clamped", attachments=())
     refused(body, method, "frictionless", obstacles=(Plane((0, 0, -1), (0, 0, 1), friction=0.2),))

@@ -116,7 +116,7 @@ def test_a_body_runs_or_is_refused_with_the_sentence_of_the_table(method, kind, 
             Setup(any_body, method, Clock(0.01, 1, 10))
 
 
-ASKED = {
+REQUESTS = {
     "thin_probes": (
         {"obstacles": (Probe((0.0, 0.0, 1.0)),)},
         r"method '{}' does not support thin probes \(obstacle 0\): {};",
@@ -134,21 +134,21 @@ ASKED = {
 
 
 @EACH
-@pytest.mark.parametrize("option", ASKED)
+@pytest.mark.parametrize("option", REQUESTS)
 def test_an_option_runs_or_is_refused_with_the_sentence_of_the_table(method, option, request, monkeypatch):
     monkeypatch.setattr("massspring.run.checks.cores", lambda: 2)
-    asked, sentence = ASKED[option]
+    options, sentence = REQUESTS[option]
     body = block_for(method, request)
-    if "targets" in asked:
-        asked = {"targets": {body.kept.names[0]: asked["targets"]["whole"]}}
-    if "events" in asked:
-        asked = {"events": (Event(body, np.arange(body.node_count), np.arange(body.kept.count), 1),)}
+    if "targets" in options:
+        options = {"targets": {body.kept.names[0]: options["targets"]["whole"]}}
+    if "events" in options:
+        options = {"events": (Event(body, np.arange(body.node_count), np.arange(body.kept.count), 1),)}
     clock, supported = clock_for(body, 2, 2, method=method), getattr(method.capabilities, option)
     if supported:
-        assert runs(Setup(body, method, clock, **asked))
+        assert runs(Setup(body, method, clock, **options))
     else:
         with pytest.raises(MassSpringError, match=sentence.format(method.name, supported.because)):
-            Setup(body, method, clock, **asked)
+            Setup(body, method, clock, **options)
 
 
 @EACH
@@ -180,8 +180,8 @@ def test_every_pair_meets(options, exclude):
         assert {(row[a], row[b]) for row in product} == {(row[a], row[b]) for row in met}
 
 
-def test_every_capability_is_asked_for_here():
-    assert set(OPTIONS) == set(ASKED) | {name for names in NEEDED.values() for name in names}
+def test_every_capability_has_a_request_here():
+    assert set(OPTIONS) == set(REQUESTS) | {name for names in NEEDED.values() for name in names}
     assert set(KINDS) <= set(REFUSED)
     for keeps, kinds in SUPPORTED.items():
         assert set(kinds) == {kind for kind in KINDS if keeps not in REFUSED[kind]}

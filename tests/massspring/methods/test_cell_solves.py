@@ -136,11 +136,11 @@ def test_sweeps_over_cells_keep_the_whole(block_body):
 @pytest.mark.parametrize("compliance", [1e-5, 1e-3])
 def test_the_sum_of_cells_asks_for_nothing_that_the_cells_do_not(block_body, compliance):
     """Every cell has its compliant volume in the end, to round-off, where a target asks for 2 % more than at rest."""
-    method, asked = Xpbd(iterations=200, compliance=compliance), 1.02
+    method, target = Xpbd(iterations=200, compliance=compliance), 1.02
     setup = Setup(block_body, method, Clock(1e-3, 1, 1))
-    boundary = setup.boundary(0)._replace(volume_target=np.array([[asked * block_body.volume]]))
+    boundary = setup.boundary(0)._replace(volume_target=np.array([[target * block_body.volume]]))
     after = method.advance(setup.start(), boundary)
-    missing = asked - cell_volumes(block_body, after.x) / block_body.tetrahedron_volumes
+    missing = target - cell_volumes(block_body, after.x) / block_body.tetrahedron_volumes
     assert np.abs(missing - compliance * after.memory.pressure).max() < 1e-11
     assert missing.min() > 1e-3
 
@@ -154,7 +154,7 @@ def test_xpbd_of_the_whole_is_newton_s_iteration(body):
     assert errors[3] < 1e-13
 
 
-def test_xpbd_of_the_whole_is_as_compliant_as_it_is_told(ball_body):
+def test_xpbd_of_the_whole_has_the_compliance_of_its_setting(ball_body):
     after = one_step(ball_body, Xpbd("whole", 30, compliance=1e-5))
     missing = 1 - enclosed_volume(after.x, ball_body.triangles) / ball_body.volume
     assert missing > 1e-4

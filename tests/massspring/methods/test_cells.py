@@ -211,7 +211,7 @@ def test_settings_that_make_no_sense_are_refused(bad):
         bad()
 
 
-def test_bodies_that_do_not_fit_are_told_why(ball_body, hollow_body):
+def test_bodies_that_do_not_fit_get_a_reason(ball_body, hollow_body):
     for method in (Barycentre(), Element(), Xpbd()):
         assert "fill its mesh" in method.why_not(ball_body)
         assert "keeps 2" in method.why_not(hollow_body)

@@ -138,9 +138,9 @@ def test_a_target_that_jumps_is_followed_behind_a_warning(case):
         setup = case.setup(clock, damping=30.0, targets=jump)
     history = simulate(setup)
     assert history.outcome == "finished" and history.limited_corrections == 0
-    asked = history.volume_target / case.body.rest_volumes
-    assert np.diff(asked, axis=0, prepend=1.0).max() < 1.001 * clock.frame * fastest_filling(case.body)
-    assert np.abs(asked[-1] - 1.1).max() < 1e-12
+    target = history.volume_target / case.body.rest_volumes
+    assert np.diff(target, axis=0, prepend=1.0).max() < 1.001 * clock.frame * fastest_filling(case.body)
+    assert np.abs(target[-1] - 1.1).max() < 1e-12
     grown = history.volume[-1] / case.body.rest_volumes - 1.0
     assert np.abs(grown - 0.1).max() < (1e-3 if case.method.volume_tol else 0.05)
 

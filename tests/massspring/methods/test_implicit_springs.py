@@ -179,7 +179,7 @@ def test_the_step_may_be_longer_than_the_time_in_which_damping_acts(ball_body):
     assert np.allclose(after.v, v / 4.0, rtol=0, atol=1e-9)
 
 
-def test_what_it_cannot_do_is_said():
+def test_what_it_cannot_do_is_refused():
     wall = membrane_body(*icosphere(1), 0.002, SOFT)
     with pytest.raises(MassSpringError, match="supports no triangle springs, they harden without bound"):
         Setup(wall, ImplicitSprings(), Clock(0.01, 1, 1))

@@ -173,9 +173,9 @@ def test_the_order_of_nodes_does_not_matter(monkeypatch):
     monkeypatch.setattr(renumber, "MANY", 10**6)
     plain = replace(setup)
     assert plain.inside.permutation is None
-    found = simulate(plain)
-    assert np.abs(found.final - inside.final).max() < 1e-10 * body.size
-    assert np.allclose(found.contact_force, inside.contact_force, atol=1e-6 * np.abs(found.contact_force).max())
+    history = simulate(plain)
+    assert np.abs(history.final - inside.final).max() < 1e-10 * body.size
+    assert np.allclose(history.contact_force, inside.contact_force, atol=1e-6 * np.abs(history.contact_force).max())
 
 
 @pytest.mark.skipif(cores() < 2, reason="this process may use one core")

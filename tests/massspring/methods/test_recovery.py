@@ -161,7 +161,7 @@ def test_a_target_is_followed_in_sum_on_the_way(nodal_ball):
     assert state.diagnostics.limited[0] == 4 and v < 3.0 * nodal_ball.volume
 
 
-def test_what_it_cannot_do_is_said(nodal_ball, ball_body):
+def test_what_it_cannot_do_is_refused(nodal_ball, ball_body):
     clock = clock_for(nodal_ball, 1, 2)
     with pytest.raises(MassSpringError, match="runs in float64 only, it may settle into another shape"):
         Setup(nodal_ball, RECOVERS, clock, precision="float32")

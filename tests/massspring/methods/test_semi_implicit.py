@@ -92,9 +92,9 @@ def body_order(state, table):
     """Of a state's own order of nodes, in the body's."""
     if state.permutation is None:
         return table
-    found = np.empty_like(table)
-    found[:] = table[state.permutation]
-    return found
+    in_order = np.empty_like(table)
+    in_order[:] = table[state.permutation]
+    return in_order
 
 
 def pressed(body: Body, method, dt: float, obstacle):

@@ -57,9 +57,9 @@ def test_no_node_is_faster_than_the_fastest(fast, precision):
             ]
             u[i] = kept @ u[i] + contacts.v_target[i]
         truth = np.linalg.norm(u, axis=1).max()
-        found = fastest_node(net, nodes, contacts, Push(nodes.gradient, lam), dt)
-        assert found >= truth * (1 - 1e-6)  # what SAFE makes up for
-        assert found <= truth * (1 + 1e-6)  # the fastest is made to stand out: the bound is sharp
+        speed = fastest_node(net, nodes, contacts, Push(nodes.gradient, lam), dt)
+        assert speed >= truth * (1 - 1e-6)  # what SAFE makes up for
+        assert speed <= truth * (1 + 1e-6)  # the fastest is made to stand out: the bound is sharp
 
 
 def test_a_pair_is_passed_over_only_where_nothing_crosses():

@@ -106,7 +106,7 @@ def rates_of(rows, count, shape):
     return rates
 
 
-def asked_of(stage, rates):
+def required_speeds(stage, rates):
     """How fast (count,) the corners of each row must leave its tip in the step [m/s]."""
     rows, probes = stage.probes.rows, stage.probes
     probe, direction = rows.probe[: len(rates)], rows.direction[: len(rates)]
@@ -145,28 +145,28 @@ def test_contacts_and_volume_equal_the_full_saddle_point_solve():
     u = nodes.v_star + dt * lam * net.inverse_mass[:, None] * g
     gather(stage, Push(stage.nodes.gradient, lam))
     solve_rows(stage, None)
-    beside = lam + probing.change[0]
+    pressure = lam + probing.change[0]
     impulse = rows.impulse[:count]
     assert (impulse >= 0).all() and (impulse > 0).sum() > 0
-    found = nodes.v_star + net.inverse_mass[:, None] * dt * beside * g + probing.push
+    velocity = nodes.v_star + net.inverse_mass[:, None] * dt * pressure * g + probing.push
     assert np.array_equal(rows.node[:count], probing.surface[rows.triangle[:count]])
     c = rates_of(rows, count, u.shape)
-    ask = asked_of(stage, c)
+    required = required_speeds(stage, c)
     pressing = impulse > 0
     free = np.repeat(net.inverse_mass > 0, 3)
     constraints = np.vstack([c[pressing].reshape(pressing.sum(), -1), dt * g.ravel()])[:, free]
     mass = np.repeat(net.mass, 3)[free]
-    right = np.concatenate([ask[pressing], [dt * (g * u).sum()]])
+    right = np.concatenate([required[pressing], [dt * (g * u).sum()]])
     zero = np.zeros((len(right), len(right)))
     system = np.block([[np.diag(mass), -constraints.T], [constraints, zero]])
     solution = np.linalg.solve(system, np.concatenate([mass * u.ravel()[free], right]))
     assert np.allclose(solution[len(mass) : -1], impulse[pressing], rtol=1e-6)
-    assert solution[-1] == pytest.approx(beside - lam, rel=1e-6)
-    assert np.allclose(solution[: len(mass)], found.ravel()[free], atol=1e-9)
+    assert solution[-1] == pytest.approx(pressure - lam, rel=1e-6)
+    assert np.allclose(solution[: len(mass)], velocity.ravel()[free], atol=1e-9)
     # What does not press is not missed, and complementarity leaves nothing over.
-    gap = np.einsum("kij,ij->k", c, found) - ask
-    assert (gap > -1e-6 * np.abs(ask).max()).all()
-    assert np.abs(gap * impulse).max() < 1e-6 * np.abs(ask).max() * impulse.max()
+    gap = np.einsum("kij,ij->k", c, velocity) - required
+    assert (gap > -1e-6 * np.abs(required).max()).all()
+    assert np.abs(gap * impulse).max() < 1e-6 * np.abs(required).max() * impulse.max()
 
 
 @BOTH

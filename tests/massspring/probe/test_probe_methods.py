@@ -65,8 +65,8 @@ def test_a_probe_that_meets_nothing_changes_no_bit(method):
     clock, v = clock_for(BALL, 4, 10), thrown(BALL)
     alone = Setup(BALL, method, clock, velocity=v)
     assert alone.start().probing is None  # the frame is compiled without the stage
-    beside = replace(alone, obstacles=(Probe((0.5, 0.0, 0.0)),))
-    assert np.array_equal(simulate(beside).final, simulate(alone).final)
+    with_probe = replace(alone, obstacles=(Probe((0.5, 0.0, 0.0)),))
+    assert np.array_equal(simulate(with_probe).final, simulate(alone).final)
 
 
 @EACH

@@ -1,4 +1,4 @@
-"""Single steps with a thin probe: contacts beside obstacles and a volume, and what carrying does to both."""
+"""Single steps with a thin probe: contacts together with obstacles and a volume, and what carrying does to both."""
 
 from dataclasses import replace
 
@@ -16,7 +16,7 @@ from massspring.kernels.probe.motion import gather, move
 from massspring.kernels.probe.pressure import change_of_rows, swelling
 from massspring.methods.method import begin_frame
 from tests.massspring.methods.test_methods import clock_for
-from tests.massspring.probe.test_probe import BALL, asked_of, pressed, rates_of
+from tests.massspring.probe.test_probe import BALL, pressed, rates_of, required_speeds
 from tests.massspring.probe.test_probe_volumes import gradients
 
 METHOD = ImplicitVolume()
@@ -61,8 +61,8 @@ def test_a_step_that_carries_nodes_keeps_volumes_and_books_what_the_tip_gives(an
     tip = (boundary.tips.end[0, 0] - boundary.tips.start[0, 0]) / boundary.dt
     carried = np.abs(v - tip).max(axis=1) < 1e-9 * np.linalg.norm(tip)
     assert carried.sum() == counts[CARRIED] >= 3
-    given = (before.model.mass[:, None] * v).sum(axis=0)
-    assert np.abs(after.diagnostics.contact_impulse[0] - given).max() < 1e-9 * np.abs(given).max()
+    impulse = (before.model.mass[:, None] * v).sum(axis=0)
+    assert np.abs(after.diagnostics.contact_impulse[0] - impulse).max() < 1e-9 * np.abs(impulse).max()
     # From rest, with volumes as they should be, the rates of all volumes stay zero: others make room.
     jacobian = gradients(any_body, before.x)
     assert np.abs(jacobian @ v.ravel()).max() < 1e-6 * (np.abs(jacobian) @ np.abs(v.ravel())).max()
@@ -101,7 +101,7 @@ def taken_from(contacts):
 
 
 def random_step(seed, lam):
-    """A step with contacts beside obstacles and attachments, velocities at random; what is left to each node."""
+    """A step with contacts, obstacles and attachments, and random velocities; the projection left to each node."""
     setup, rng = pressed(METHOD), np.random.default_rng(seed)
     after, boundary = begin_frame(setup.start(), setup.boundary(0)), setup.boundary(0)
     probing, nodes, contacts, net = after.probing, after.nodes, after.contacts, after.model
@@ -131,25 +131,25 @@ def test_contacts_beside_obstacles_equal_the_full_saddle_point(seed):
     u += contacts.v_target * (contacts.mode > FREE)[:, None]
     on = np.unique(BALL.triangles)
     assert np.allclose(probing.base[on], u[on], atol=1e-14)
-    found = np.where(np.isin(np.arange(len(u)), on)[:, None], probing.velocity, u)
+    velocity = np.where(np.isin(np.arange(len(u)), on)[:, None], probing.velocity, u)
     impulse, c = probing.rows.impulse[:5], rates_of(probing.rows, 5, u.shape)
-    ask, pressing = asked_of(stage, c), impulse > 0
+    required, pressing = required_speeds(stage, c), impulse > 0
     assert pressing.any()
     # W̃ M̃ = I on what is left to each node: the multipliers of obstacles and attachments drop out.
     mobile = np.einsum("n,nij->nij", w, kept)
     rates = np.vstack([c[pressing].reshape(pressing.sum(), -1), dt * g.ravel()[None]])
     moved = np.einsum("nij,knj->kni", mobile, rates.reshape(len(rates), -1, 3)).reshape(len(rates), -1)
-    wanted = np.concatenate([ask[pressing] - rates[:-1] @ u.ravel(), [0.0]])
-    truth = np.linalg.solve(rates @ moved.T, wanted)
+    right = np.concatenate([required[pressing] - rates[:-1] @ u.ravel(), [0.0]])
+    truth = np.linalg.solve(rates @ moved.T, right)
     assert np.allclose(truth[:-1], impulse[pressing], rtol=1e-6)
     assert truth[-1] == pytest.approx(probing.change[0], rel=1e-6)
-    assert np.allclose((u + (truth @ moved).reshape(-1, 3))[on], found[on], atol=1e-9)
-    gap = np.einsum("kij,ij->k", c, found) - ask
+    assert np.allclose((u + (truth @ moved).reshape(-1, 3))[on], velocity[on], atol=1e-9)
+    gap = np.einsum("kij,ij->k", c, velocity) - required
     # But where obstacles hold all that a contact would push.
     movable = np.einsum("kni,nij,knj->k", c, mobile, c) > 1e-9 * w.max()
-    assert movable.sum() >= 4 and (gap[movable] > -1e-6 * np.abs(ask).max()).all()
+    assert movable.sum() >= 4 and (gap[movable] > -1e-6 * np.abs(required).max()).all()
     # What the broad phase goes by: nothing is faster than the speed it was given.
-    assert np.linalg.norm(found - u, axis=1).max() <= bound
+    assert np.linalg.norm(velocity - u, axis=1).max() <= bound
     swollen = np.array([swelling(stage, None, i) for i in range(len(u))])
     assert 0 < np.linalg.norm(swollen, axis=1).max() <= change_of_rows(stage)
 

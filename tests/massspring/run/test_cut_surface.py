@@ -140,15 +140,15 @@ def test_each_piece_keeps_its_own_momentum(cut):
     """Behind the cut all moves one way, in front of it the other: nodes in the section alone belong to both."""
     v = np.where(cut.after.rest[:, :1] < cut.level, [[0.0, 0.3, 0.0]], [[0.0, 0.0, -0.2]])
     v += np.cross([5.0, -3.0, 2.0], cut.after.rest)
-    found = kept_momentum(v, cut.after.rest, cut.after.mass, cut.growth)
+    velocity = kept_momentum(v, cut.after.rest, cut.after.mass, cut.growth)
     for k in range(2):
         of = cut.growth.piece == k
         before, after = cut.growth.mass[of], cut.after.mass[of]
         assert before.sum() == pytest.approx(after.sum(), rel=1e-12)
-        np.testing.assert_allclose(after @ found[of], before @ v[of], rtol=1e-12, atol=1e-15)
-        turn = [m @ np.cross(cut.after.rest[of], w[of]) for m, w in ((after, found), (before, v))]
+        np.testing.assert_allclose(after @ velocity[of], before @ v[of], rtol=1e-12, atol=1e-15)
+        turn = [m @ np.cross(cut.after.rest[of], w[of]) for m, w in ((after, velocity), (before, v))]
         np.testing.assert_allclose(*turn, rtol=1e-12, atol=1e-15)
-    assert np.abs(found - v).max() > 1e-3  # mass has moved to the section
+    assert np.abs(velocity - v).max() > 1e-3  # mass has moved to the section
 
 
 def test_the_elastic_energy_falls_by_that_of_the_springs_across(cut):
@@ -189,8 +189,8 @@ def test_new_springs_begin_without_force_and_end_with_their_rest_lengths(cut):
 def test_rest_lengths_are_let_in_on_a_straight_way():
     letting = LettingIn(np.array([1]), np.array([3.0]), 2.0, 0.5)
     rest = np.array([1.0, 2.0])
-    for t, wanted in ((2.0, 3.0), (2.25, 2.5), (2.5, 2.0), (9.0, 2.0)):
-        np.testing.assert_allclose(letting.lengths(rest, t), [1.0, wanted], rtol=1e-15)
+    for t, length in ((2.0, 3.0), (2.25, 2.5), (2.5, 2.0), (9.0, 2.0)):
+        np.testing.assert_allclose(letting.lengths(rest, t), [1.0, length], rtol=1e-15)
     assert [letting.done(t) for t in (2.0, 2.4, 2.5)] == [False, False, True]
     assert LettingIn(np.array([1]), np.array([3.0]), 2.0, 0.0).lengths(rest, 2.0)[1] == 2.0
 
@@ -277,9 +277,9 @@ def test_weights_meet_every_place():
     assert len(inside) == 4 and len(outline) == len(rim) == 12
     np.testing.assert_allclose(weights @ flat[outline], flat[inside], atol=1e-15)
     cloud, places = np.random.default_rng(2).standard_normal((2, 30, 3))
-    found = affine(cloud, places)
-    np.testing.assert_allclose(found @ cloud, places, atol=1e-12)
-    np.testing.assert_allclose(found.sum(axis=1), 1.0, rtol=1e-12)
+    coefficients = affine(cloud, places)
+    np.testing.assert_allclose(coefficients @ cloud, places, atol=1e-12)
+    np.testing.assert_allclose(coefficients.sum(axis=1), 1.0, rtol=1e-12)
 
 
 def test_numbers_over_two_events_are_carried_through_both():
@@ -322,9 +322,9 @@ def test_a_piece_is_cut_again():
     pairs = np.searchsorted(later[3], two.pairs)
     gaps = np.linalg.norm(np.subtract(*history.snapshots[:, pairs.T].transpose(1, 0, 2, 3)), axis=2)
     assert gaps[:2].max() == 0.0 and gaps[2].min() > 1e-5
-    known = history.snapshots[0][np.isin(second.body.rest[:, 0], 0.08) & (second.growth.mass > 0)]
+    older = history.snapshots[0][np.isin(second.body.rest[:, 0], 0.08) & (second.growth.mass > 0)]
     born = history.snapshots[0][np.intersect1d(pairs, np.flatnonzero(second.growth.mass == 0))]
-    assert (born > known.min(axis=0)).all() and (born < known.max(axis=0)).all()
+    assert (born > older.min(axis=0)).all() and (born < older.max(axis=0)).all()
 
 
 def test_what_cannot_be_cut_so_is_refused():

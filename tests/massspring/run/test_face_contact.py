@@ -228,8 +228,8 @@ def test_a_step_solves_volumes_pairs_and_obstacles_together(kind, plane, enterin
     assert entering or (along[able] > -1e-12).all(), along[able].min()
     assert (pairs.impulse[~touching] == 0.0).all()
     target = setup.body.kept.jacobian(before.x) @ (after.x - before.x).ravel()
-    wanted = boundary.volume_target[0] - setup.body.kept.measure(before.x)
-    np.testing.assert_allclose(target, wanted, atol=3e-9 * setup.body.rest_volumes.max())
+    missing = boundary.volume_target[0] - setup.body.kept.measure(before.x)
+    np.testing.assert_allclose(target, missing, atol=3e-9 * setup.body.rest_volumes.max())
     if plane and kind != "quadratic":
         both = after.contacts.mode[pairs.node[touching]] > 0
         assert both.any()
@@ -291,12 +291,12 @@ def test_impulses_of_pairs_that_slipped_act_along_the_slope_of_their_gaps(kind):
 
     way = random.normal(size=x.shape)
     slope = (pushed(x + 1e-7 * way) - pushed(x - 1e-7 * way)) / 2e-7
-    given, mass, gradient = np.zeros_like(x), random.uniform(0.5, 2.0, len(x)), random.normal(size=x.shape)
+    velocity, mass, gradient = np.zeros_like(x), random.uniform(0.5, 2.0, len(x)), random.normal(size=x.shape)
     measure_pairs(pairs, x, np.ones(len(x)))
-    flow = turn_faces(pairs, x, 1.0 / mass, given, gradient)
-    assert flow == pytest.approx((gradient * given).sum(), rel=1e-12)
+    flow = turn_faces(pairs, x, 1.0 / mass, velocity, gradient)
+    assert flow == pytest.approx((gradient * velocity).sum(), rel=1e-12)
     assert turn_faces(pairs, x, 1.0 / mass, np.zeros_like(x), None) == 0.0
-    force = mass[:, None] * given
+    force = mass[:, None] * velocity
     assert np.abs(force).max() > 0.01
     np.add.at(force, j, pairs.impulse[:, None] * pairs.normal)
     np.add.at(force, i, -pairs.impulse[:, None] * pairs.normal)
@@ -305,7 +305,7 @@ def test_impulses_of_pairs_that_slipped_act_along_the_slope_of_their_gaps(kind):
     assert np.abs(np.cross(x, force).sum(axis=0)).max() < 1e-12 * np.abs(force).sum() * np.abs(x).max()
 
 
-def test_faces_that_slide_by_more_than_an_edge_are_told_and_let_go():
+def test_a_warning_names_faces_that_slide_by_more_than_an_edge():
     halves = Halves("one")
     setup = halves.setup(halves.cut, True)
     away = Trajectory((0.0, 0.2, 0.8), ((0, 0, 0), (-0.002, 0, 0), (-0.002, 0.03, 0)))

@@ -31,9 +31,9 @@ def pressed(body: Body, method, precision: str, shift: np.ndarray) -> Setup:
     clock = clock_for(body, 20, 20)
     depth, size = 0.05 * float(np.ptp(body.rest[:, 2])), float(np.ptp(body.rest[:, 0]))
     middle = body.rest.mean(axis=0)
-    beside = np.array([body.rest[:, 0].max() + 0.5 * size, middle[1], middle[2]])
+    centre = np.array([body.rest[:, 0].max() + 0.5 * size, middle[1], middle[2]])
     still, inwards = (0.0, 0.0, 0.0), (-0.1 * size, 0.0, 0.0)
-    ball = Sphere(tuple(beside + shift), 0.5 * size, Trajectory((0.0, clock.duration), (still, inwards)), 0.3)
+    ball = Sphere(tuple(centre + shift), 0.5 * size, Trajectory((0.0, clock.duration), (still, inwards)), 0.3)
     aside = Trajectory((0.0, clock.duration), (still, (0.0, 0.02 * size, 0.0)))
     held = Attachment(np.flatnonzero(body.rest[:, 0] < body.rest[:, 0].min() + 0.1 * size), aside)
     there = replace(body, rest=body.rest + shift)
@@ -67,11 +67,11 @@ def test_many_volumes_are_met_at_ten_metres(filled_ball):
 
 def test_a_state_is_relative_to_the_middle_of_the_body_at_the_start(ball_body):
     setup = pressed(ball_body, ImplicitVolume(), "float32", FAR)
-    state, given = setup.start(), setup.positions
-    assert given is not None and np.abs(state.nodes.x).max() < 0.51 * np.ptp(given, axis=0).max()
-    assert np.abs(state.x - given).max() < 1e-8
-    back = state.moved_to(given + 0.01)
-    assert np.abs(back.x - given - 0.01).max() < 1e-8
+    state, positions = setup.start(), setup.positions
+    assert positions is not None and np.abs(state.nodes.x).max() < 0.51 * np.ptp(positions, axis=0).max()
+    assert np.abs(state.x - positions).max() < 1e-8
+    back = state.moved_to(positions + 0.01)
+    assert np.abs(back.x - positions - 0.01).max() < 1e-8
 
 
 def test_the_tip_of_a_probe_is_where_it_is_in_double_precision(ball_body):

@@ -1,4 +1,4 @@
-"""A run numbers the nodes of a large body its own way; outside of the run it cannot be seen."""
+"""A run renumbers the nodes of a large body; nothing outside the run shows it."""
 
 from dataclasses import replace
 
@@ -69,14 +69,14 @@ def test_the_numbers_of_the_nodes_change_nothing(ball, method):
     v, clock = 0.1 * thrown(ball), clock_for(ball, 2, 10)
     plain = simulate(in_mesh_order(pressed(ball, method, v, clock)), snapshots=(1,))
     assert np.abs(plain.contact_force).max() > 0 and np.abs(plain.held_force).max() > 0
-    for found, number in (
+    for history, number in (
         (simulate(pressed(ball, method, v, clock), (1,)), slice(None)),
         (simulate(pressed(other, method, v[np.argsort(place)], clock), (1,)), place),
     ):
-        assert np.abs(found.final[number] - plain.final).max() < ROUND_OFF * ball.size
-        assert np.abs(found.snapshots[0][number] - plain.snapshots[0]).max() < ROUND_OFF * ball.size
+        assert np.abs(history.final[number] - plain.final).max() < ROUND_OFF * ball.size
+        assert np.abs(history.snapshots[0][number] - plain.snapshots[0]).max() < ROUND_OFF * ball.size
         for name in ("volume", "pressure", "contact_force", "held_force", "kinetic", "elastic", "penetration"):
-            a, b = getattr(found, name), getattr(plain, name)
+            a, b = getattr(history, name), getattr(plain, name)
             assert np.abs(a - b).max() <= 1e3 * ROUND_OFF * np.abs(b).max(), name
 
 
@@ -86,9 +86,9 @@ def test_one_volume_per_node_keeps_its_name_and_node():
     body = body.keeping(Volumes.nodal(body))
     assert body.node_count >= MANY
     setup = pressed(body, ImplicitVolume(tolerance=1e-12), 0.1 * thrown(body), clock_for(body, 2, 10))
-    found, plain = simulate(setup), simulate(in_mesh_order(setup))
-    assert np.abs(found.final - plain.final).max() < 1e-9 * body.size  # the tolerance of the solves, not round-off
-    assert np.abs(found.pressure - plain.pressure).max() < 1e-6 * np.abs(plain.pressure).max()
+    history, plain = simulate(setup), simulate(in_mesh_order(setup))
+    assert np.abs(history.final - plain.final).max() < 1e-9 * body.size  # the tolerance of the solves, not round-off
+    assert np.abs(history.pressure - plain.pressure).max() < 1e-6 * np.abs(plain.pressure).max()
 
 
 def test_nodes_of_a_full_slice_follow_each_other(ball):

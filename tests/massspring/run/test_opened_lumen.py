@@ -82,8 +82,8 @@ class Opened:
 
     def _facets(self, lumen):
         facets = boundary_facets(self.cells.astype(np.uint32)).astype(np.int64)
-        wanted = {tuple(sorted(row)) for row in lumen.tolist()}
-        inner = [tuple(sorted(row)) in wanted for row in facets[:, :3].tolist()]
+        lumen_faces = {tuple(sorted(row)) for row in lumen.tolist()}
+        inner = [tuple(sorted(row)) in lumen_faces for row in facets[:, :3].tolist()]
         return facets[inner][:, [0, 2, 1, 5, 4, 3]]
 
     def held(self, body):
@@ -91,10 +91,10 @@ class Opened:
 
     def content(self, x: np.ndarray) -> float:
         """Volume of the lumen [m³] of the positions `x` after the cut: its surface, and a lid over the gap."""
-        wanted = {tuple(sorted(row)) for row in self.lumen.tolist()}
+        lumen_faces = {tuple(sorted(row)) for row in self.lumen.tolist()}
         triangles = boundary(self.opening.cells[:, :4].astype(np.int64))
         was = self.opening.parent[triangles]
-        inner = np.array([tuple(sorted(row)) in wanted for row in was.tolist()])
+        inner = np.array([tuple(sorted(row)) in lumen_faces for row in was.tolist()])
         inside = triangles[inner][:, ::-1]
         half = inside[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
         there = {tuple(row) for row in half.tolist()}

@@ -21,9 +21,9 @@ from tests.massspring.methods.test_methods import clock_for
 def test_what_is_not_finite_at_the_start_is_refused(block_body, changes, words):
     spoiled = np.zeros_like(block_body.rest)
     spoiled[7, 1] = np.nan
-    given = {name: spoiled if isinstance(value, str) else value for name, value in changes.items()}
+    options = {name: spoiled if isinstance(value, str) else value for name, value in changes.items()}
     with pytest.raises(MassSpringError, match=words):
-        Setup(block_body, Free(), clock_for(block_body, 1, 1), **given)
+        Setup(block_body, Free(), clock_for(block_body, 1, 1), **options)
 
 
 @pytest.mark.parametrize("wrong", [np.nan, np.inf])

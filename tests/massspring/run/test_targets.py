@@ -39,11 +39,11 @@ def ramps(draw):
 def test_what_is_followed_is_what_small_steps_towards_the_target_give(target, rate):
     end = max(target.times[-1], 0.0) + 3.0 / rate
     t = np.linspace(0.0, end, 4001)
-    found = followed(target, rate)(t)
+    values = followed(target, rate)(t)
     # A small step turns a corner late, by its own length.
-    assert np.abs(found - marched(target, rate, t)).max() < 2.5 * rate * (t[1] - t[0]) + 1e-12
-    assert found[0] == pytest.approx(1.0, abs=1e-12)
-    assert np.abs(np.diff(found)).max() <= rate * (t[1] - t[0]) * (1 + 1e-9) + 1e-12
+    assert np.abs(values - marched(target, rate, t)).max() < 2.5 * rate * (t[1] - t[0]) + 1e-12
+    assert values[0] == pytest.approx(1.0, abs=1e-12)
+    assert np.abs(np.diff(values)).max() <= rate * (t[1] - t[0]) * (1 + 1e-9) + 1e-12
 
 
 def test_what_is_slow_is_followed_as_it_is():

@@ -64,11 +64,11 @@ def test_threads_change_no_bit(ball, method, precision):
 
 def test_threads_search_all_nodes_where_obstacles_are_in_that_step(ball):
     """Also those that nothing comes near: their distances show whether they were searched."""
-    found = []
+    gaps = []
     for threads in (1, 2, 3):
         setup = slid(ball, Free(), threads=threads)
-        found.append(setup.method.advance(setup.start(), setup.boundary(0)).contacts.predicted_gap)
-    assert np.array_equal(found[0], found[1]) and np.array_equal(found[0], found[2])
+        gaps.append(setup.method.advance(setup.start(), setup.boundary(0)).contacts.predicted_gap)
+    assert np.array_equal(gaps[0], gaps[1]) and np.array_equal(gaps[0], gaps[2])
 
 
 def test_each_thread_writes_on_scratch_of_its_own(ball):

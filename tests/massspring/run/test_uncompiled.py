@@ -85,9 +85,9 @@ SCENES = {scene.__name__: scene for scene in (slices, implicit, probed, facets)}
 
 def answers(name) -> dict[str, object]:
     history = simulate(SCENES[name]())
-    found = {"final": history.final, "pressure": history.pressure, "contact_force": history.contact_force}
+    fields = {"final": history.final, "pressure": history.pressure, "contact_force": history.contact_force}
     counts = history.probe_counts.sum(axis=0).tolist()
-    values = {key: np.ravel(value).tolist() for key, value in found.items()}
+    values = {key: np.ravel(value).tolist() for key, value in fields.items()}
     return {"outcome": history.outcome, "counts": counts, **values}
 
 

@@ -34,13 +34,13 @@ def checkout(tmp_path, monkeypatch):
 
 def fresh(*modules: str, **within) -> str:
     """As another process would find it."""
-    for known in (source_fingerprint, sources._followed, sources._source, sources._remembered):
-        known.cache_clear()
+    for function in (source_fingerprint, sources._followed, sources._source, sources._remembered):
+        function.cache_clear()
     return source_fingerprint(*modules, **within)
 
 
 @pytest.fixture(autouse=True)
 def forget():
     yield
-    for known in (source_fingerprint, sources._followed, sources._source, sources._remembered):
-        known.cache_clear()
+    for function in (source_fingerprint, sources._followed, sources._source, sources._remembered):
+        function.cache_clear()

@@ -11,9 +11,9 @@ from massspring.sources import ROOT
 
 
 @njit_inlined
-def share(row, place, wanted):
+def share(row, place, included):
     """A part of its callers alone."""
-    return row[place] if wanted else 0.0
+    return row[place] if included else 0.0
 
 
 @njit_lean

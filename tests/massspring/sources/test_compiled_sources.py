@@ -1,4 +1,4 @@
-"""Compiled functions: what they may use, and which edit compiles them anew."""
+"""Compiled functions: what they may use, and which edit compiles them again."""
 
 import ast
 import gc
@@ -85,7 +85,7 @@ def compiled_now(folder: Path):
     return function.stats
 
 
-def test_rewording_compiles_nothing_anew_and_an_edit_does(checkout, monkeypatch):
+def test_rewording_compiles_nothing_again_and_an_edit_does(checkout, monkeypatch):
     monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
     monkeypatch.setattr(compile_cache, "COMPILED", ("massspring",))
     file = checkout / "massspring" / "kernel.py"
@@ -99,7 +99,7 @@ def test_rewording_compiles_nothing_anew_and_an_edit_does(checkout, monkeypatch)
     assert sum(compiled_now(checkout).cache_misses.values()) == 1
 
 
-def test_fields_of_an_argument_that_change_places_compile_anew(checkout, monkeypatch):
+def test_fields_of_an_argument_that_change_places_compile_again(checkout, monkeypatch):
     """The kernel does not import the named tuple, and numba sees the same name and types as before."""
     monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
     monkeypatch.setattr(compile_cache, "COMPILED", ("massspring",))
@@ -107,8 +107,8 @@ def test_fields_of_an_argument_that_change_places_compile_anew(checkout, monkeyp
         KERNEL.replace("from massspring.table import LIMIT", "LIMIT = 3")
     )
     pair = checkout / "massspring" / "pair.py"
-    for given, misses in (((), 0), (("massspring.pair",), 1)):
-        monkeypatch.setattr(compile_cache, "ARGUMENTS", given)
+    for arguments, misses in (((), 0), (("massspring.pair",), 1)):
+        monkeypatch.setattr(compile_cache, "ARGUMENTS", arguments)
         pair.write_text("class Pair(NamedTuple):\n    x: float\n    v: float\n")
         assert sum(compiled_now(checkout).cache_misses.values()) == 1
         pair.write_text("class Pair(NamedTuple):\n    v: float\n    x: float\n")

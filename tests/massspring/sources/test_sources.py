@@ -83,17 +83,17 @@ def test_refusals(checkout):
 
 
 def test_relative_imports_are_followed():
-    found = read_source(b"from .b import c\nfrom .. import d\nimport massspring.e\n", "massspring.x.a", Path("a.py"))
-    assert found.imports == [("massspring", "d"), ("massspring.e", ""), ("massspring.x.b", "c")]
+    source = read_source(b"from .b import c\nfrom .. import d\nimport massspring.e\n", "massspring.x.a", Path("a.py"))
+    assert source.imports == [("massspring", "d"), ("massspring.e", ""), ("massspring.x.b", "c")]
 
 
 def statements(tree: ast.Module) -> list[ast.stmt]:
     """Of a package, with those for type checkers alone or for running alone."""
-    found = []
+    body = []
     for node in tree.body:
         apart = isinstance(node, ast.If) and ast.unparse(node.test) in ("TYPE_CHECKING", "not TYPE_CHECKING")
-        found += node.body if apart else [node]
-    return found
+        body += node.body if apart else [node]
+    return body
 
 
 def test_a_stub_leads_to_the_code_behind_a_name(checkout):
