@@ -27,7 +27,7 @@ COMPILED = pytest.StashKey[list[Compiled]]()
 
 @contextmanager
 def locked(path: Path, patience: float = PATIENCE) -> Iterator[None]:
-    """Inside, no other process that asks for the same lock file. Fails when it is not given within `patience` [s]."""
+    """Holds a lock file, which one process at a time can have. Fails where another one keeps it for `patience` [s]."""
     waited_until = time.monotonic() + patience
     while True:
         try:
@@ -107,7 +107,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Listens where that is asked for."""
+    """Listens to numba's compiler where `--compiled` is given."""
     watch = CompileWatch()
     config.stash[COMPILED] = watch.compiled
     if config.getoption("--compiled") is not None:

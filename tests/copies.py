@@ -17,7 +17,7 @@ from unittest import mock
 from massspring.sources import ROOT
 
 MAKERS = ("studies.geometry.mesher.organ_recipe", "studies.geometry.mesher.scan_recipe")
-"""What a mesher's process is asked to run."""
+"""Modules that a mesher's process runs."""
 IMPORTED = (__name__, *MAKERS, "studies.sweep.local", "studies.runs.run", "studies.reference.solve")
 ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
 ANY = ("ORGANBENCH_", "PYTEST_", "PYTHONPATH", "KMP_", "PYPARDISO_")
@@ -30,7 +30,7 @@ PIPE = subprocess.PIPE
 
 
 def can_be_copied(environment: Mapping[str, str]) -> bool:
-    """Whether libraries find the variables that they found in the process that is copied."""
+    """Whether the variables that libraries read are those of the process that is copied."""
     first, now = (
         {name: value for name, value in every.items() if name not in ONE_THREAD and not name.startswith(ANY)}
         for every in (BEFORE, environment)

@@ -9,22 +9,22 @@ from tests.conftest import locked, once_per_run
 
 
 def test_two_that_ask_at_once_get_what_one_makes(tmp_path):
-    made, seen = [], []
+    folders, contents = [], []
 
     def make(folder):
-        made.append(folder)
+        folders.append(folder)
         time.sleep(0.2)
         (folder / "file").write_text("whole")
 
     def ask():
-        seen.append((once_per_run(tmp_path, "thing", make) / "file").read_text())
+        contents.append((once_per_run(tmp_path, "thing", make) / "file").read_text())
 
     threads = [threading.Thread(target=ask) for _ in range(3)]
     for thread in threads:
         thread.start()
     for thread in threads:
         thread.join()
-    assert len(made) == 1 and seen == ["whole"] * 3
+    assert len(folders) == 1 and contents == ["whole"] * 3
 
 
 def test_what_fails_leaves_nothing_and_is_tried_again(tmp_path):

@@ -79,10 +79,10 @@ def add(monkeypatch):
     return added
 
 
-def hold(module, thing: str, slow: bool = False, **given) -> int:
+def hold(module, thing: str, slow: bool = False, **choices) -> int:
     """Calls the tests of a contract that take `thing`, with every value of what else they take; how many tests.
 
-    `given`: parameter -> its values. A test that takes something that is not given is an error, so that none is lost.
+    `choices`: parameter -> its values. A test that takes a parameter without choices is an error, so that none is lost.
     """
     count = 0
     for name, test in inspect.getmembers(module, inspect.isfunction):
@@ -90,9 +90,9 @@ def hold(module, thing: str, slow: bool = False, **given) -> int:
         marks = {mark.name for mark in getattr(test, "pytestmark", [])}
         if not name.startswith("test_") or thing not in wants or "campaign" in marks or ("slow" in marks) != slow:
             continue
-        missing = set(wants) - set(given)
+        missing = set(wants) - set(choices)
         assert not missing, f"{module.__name__}.{name} takes {', '.join(missing)}"
-        for values in itertools.product(*(given[parameter] for parameter in wants)):
+        for values in itertools.product(*(choices[parameter] for parameter in wants)):
             test(*values)
         count += 1
     return count

@@ -14,7 +14,7 @@ def list_active(contacts: Contacts) -> None:
 
 
 def activate(contacts: Contacts, nodes: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """Activates free nodes (c,) on one obstacle, with any normals; the speeds a asked for along them [m/s], (c,)."""
+    """Activates free nodes (c,) on one obstacle, with random normals; the target speeds along them [m/s], (c,)."""
     normals = rng.normal(size=(len(nodes), 3))
     contacts.normal[nodes] = normals / np.linalg.norm(normals, axis=1)[:, None]
     approach = 0.05 * rng.normal(size=len(nodes))

@@ -1,4 +1,4 @@
-"""The second opinion: NGSolve gives the same answers on the same meshes, and would tell a difference."""
+"""The second opinion: NGSolve gives the same answers on the same meshes, and a difference would show."""
 
 from dataclasses import replace
 

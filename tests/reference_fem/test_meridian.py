@@ -1,4 +1,4 @@
-"""The second judge's meridian: right on a ball that is known, its own Newton, and whole again in three dimensions."""
+"""The second judge's meridian: a ball with a converged solution, its own Newton, and the turn to three dimensions."""
 
 import numpy as np
 import pytest

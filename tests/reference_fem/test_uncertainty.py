@@ -1,4 +1,4 @@
-"""The error bar: exact on exact power laws, honest where there is none, and large enough on a body that is known."""
+"""The error bar: exact on exact power laws, honest where there is none, and large enough on a converged body."""
 
 import numpy as np
 import pytest

@@ -43,7 +43,7 @@ def test_the_second_time_nothing_is_made(own_cache, monkeypatch):
 
 @pytest.mark.parametrize(("name", "nodes"), [("ball", 100), ("stomach", 300)])
 def test_a_surface_made_before_is_filled_as_if_made_now(own_cache, monkeypatch, name, nodes):
-    """It is not made again for what fills it, to the bit, be the organ solid or hollow."""
+    """A solid organ and a hollow one: the cached surface is filled, and the mesh is the same to the bit."""
     alone = organ(name, nodes)
     monkeypatch.setenv("ORGANBENCH_CACHE", str(own_cache / "other"))
     surface, run_worker, inputs = organ(name, nodes, fill=False), jobs.run_worker, []

@@ -1,4 +1,4 @@
-"""The organs as functions of position: sizes from the literature, even walls, boxes, attachments, bad wishes."""
+"""The organs as functions of position: sizes from the literature, even walls, boxes, attachments, refusals."""
 
 import ast
 import inspect

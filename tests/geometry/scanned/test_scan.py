@@ -31,13 +31,13 @@ def test_real_organs_at_550_nodes(name):
     points, triangles = raw_surface(path)
     source = points * MM, triangles
     with warnings.catch_warnings():
-        warnings.simplefilter("error")  # these surfaces need no mending
+        warnings.simplefilter("error")  # these surfaces need no repair
         mesh = scan(path, 550, unit="mm")
     assert mesh.surface_count == 550 and len(mesh.triangles) == 1096
     surface = mesh.points[:550], mesh.triangles
     check_surface(*surface)
     check_tetrahedra(mesh.points, mesh.tetrahedra)
-    # The numbers asked for; measured: 1.0 to 1.7 % and -1.8 to -1.5 %, most of it the polyhedron's chords.
+    # The required bounds; measured: 1.0 to 1.7 % and -1.8 to -1.5 %, most of it the polyhedron's chords.
     assert hausdorff_share(mesh, *source) < 0.03
     assert abs(mesh.volume / signed_volume(*source) - 1) < 0.04
     assert dihedral_angles(mesh.points, mesh.tetrahedra).min() > 8.0

@@ -36,7 +36,7 @@ def test_the_shape_has_the_volume_of_the_surface(egg, shape):
 
 
 def test_cells_are_fine_where_the_surface_asks_for_them(egg, shape):
-    """A smooth egg is known on the coarsest cells; one with a thin flap at its side is not."""
+    """The coarsest cells resolve a smooth egg; one with a thin flap at its side needs finer ones."""
     diagonal = 2 * np.linalg.norm(AXES)
     assert shape.cell == pytest.approx(diagonal / 40, rel=1e-2)
     points = egg[1].copy()

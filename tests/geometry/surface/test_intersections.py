@@ -34,7 +34,7 @@ def test_orientation_is_exact_near_a_plane():
     assert signs.tolist() == exact
     assert {-1, 1} <= set(exact)
     rounded = np.sign(np.einsum("ij,ij->i", a - d, np.cross(b - d, c - d)))
-    assert (rounded != exact).any()  # plain floating point does not know
+    assert (rounded != exact).any()  # plain floating point gets some signs wrong
 
 
 def _rows(a, b, c, d):

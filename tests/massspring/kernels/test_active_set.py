@@ -72,7 +72,7 @@ def test_friction_acts_against_the_slip(sole):
     impulses = np.linspace(-1.0, 2.0, len(sole.nodes))
     assert not sole.contact.apply_friction(sole.end(slip), active, impulses)
     expected = -MU * np.maximum(impulses, 0.0)[:, None] * slip / 0.05
-    # A way of 0.25 mm is known to 1e-17 m.
+    # Round-off of a way of 0.25 mm is 1e-17 m.
     assert np.abs(sole.contact.friction_impulse[sole.nodes] - expected).max() < 1e-11
     assert (sole.contacts.mode[sole.nodes] == SLIDES).all()
 

@@ -108,5 +108,5 @@ def test_it_saves_iterations(kept, filled_ball, bent):
         trial.right[:], trial.allowed[:] = right, 1e-6 * np.abs(right).max()
         counts.append(solve_iteratively(trial, state.contacts, weight, trial.lam, trial.allowed, 500))
         left = np.abs(right - today @ trial.lam).max()
-        assert left < 1.01e-6 * np.abs(right).max()  # what is followed and what is so differ by round-off
+        assert left < 1.01e-6 * np.abs(right).max()  # the recursive residual and the true one differ by round-off
     assert counts[0] < 0.8 * counts[1]

@@ -172,7 +172,7 @@ def test_revised_contacts_are_those_of_the_new_pressure(shell, name, way):
 @pytest.mark.parametrize("friction", [0.5, 1.5])
 @pytest.mark.parametrize("name", ["a floor", "a sphere"])
 def test_slip_loses_what_coulomb_says(shell, name, friction):
-    """Beside an obstacle that moves: v⁺ = w + s max(0, 1 − mu p/|s|) along it, p what it pushes by."""
+    """On a moving obstacle: v⁺ = w + s max(0, 1 − mu p/|s|) along it, p what it pushes by."""
     (still,), _ = OBSTACLES[name]
     smooth, rough = (Scene(shell, (type(still)(*_shape(still), ALONG, mu),)).find() for mu in (0.0, friction))
     on = np.flatnonzero(smooth.contacts.mode == SLIDES)

@@ -92,7 +92,7 @@ def test_a_bulge_and_a_dent_are_the_same_angle():
     assert angle_energy(x, angles) == angle_energy(x * [1, -1, 1], angles) > 0.0
     force = np.ones_like(x)
     angle_forces_into(x * [1, 0, 1], angles, force)
-    assert not force.any()  # straight: it does not know whereto
+    assert not force.any()  # straight: the force has no direction
 
 
 def test_they_stiffen_a_press_and_keep_no_volume(filled_ball):

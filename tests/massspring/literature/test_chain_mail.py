@@ -48,7 +48,7 @@ def renamed(links, number):
 
 def test_every_link_is_within_its_limits_after_a_far_move(block_body):
     x, links, _ = displaced(block_body, ChainMail())
-    assert np.abs(x - block_body.rest).max() > 0.1 * block_body.size  # the others were taken along
+    assert np.abs(x - block_body.rest).max() > 0.1 * block_body.size  # the links move the other nodes too
     assert out_of_bounds(links, x) < ROUND_OFF
     assert out_of_bounds(links, block_body.rest) < 0.0
 

@@ -55,7 +55,7 @@ NEEDED = {
     "prestressed": ("prestress",),
     "quadratic": ("prestress", "point_volumes", "facet_contact"),
 }
-"""Kind of body -> the capabilities that it needs, in the order in which they are asked for."""
+"""Kind of body -> the capabilities that it needs, in the order in which they are checked."""
 
 
 @pytest.fixture(params=REFUSED)

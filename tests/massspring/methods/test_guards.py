@@ -63,8 +63,8 @@ def guard(options=("",), exclude=(), where=lambda method, kind: True):
 
 @guard(where=lambda method, kind: not recovers(method))
 def test_a_body_on_a_line_is_counted_and_not_thrown(case):
-    """G = 0: each step of a method that would mend the volume is counted, and nothing is divided by 0. What recovers is
-    thrown about (test_recovery.py)."""
+    """G = 0: each step of a method that would correct the volume is counted, and nothing is divided by 0. Methods that
+    recover throw the nodes about (test_recovery.py)."""
     clock = clock_for(case.body, 3, 10, fraction=0.2, method=case.method)
     history = simulate(case.setup(clock, damping=20.0, positions=start_of(case.body, LINE)))
     assert history.outcome == "finished"

@@ -30,7 +30,7 @@ def there_and_back(plane: Plane, depth: float, duration: float) -> Plane:
 
 @pytest.mark.parametrize("angle", [None, 0.4], ids=["one plane", "a wedge"])
 def test_no_obstacle_pulls_a_node(shell, angle):
-    """Every step of a run in which planes come and go: what they do to a node they hold points out of them."""
+    """In every step of a run in which planes come and go, a plane pushes each node on it outwards."""
     clock = Clock(0.5 * step_limit(shell).undamped, 1500, 1)
     top = Plane((0, 0, 0.05), (0, 0, -1))
     planes = (top,) if angle is None else wedge_of(0.0, clock.duration, angle)

@@ -98,7 +98,7 @@ def test_an_attachment_bears_what_presses_on_its_nodes(method):
 
 
 def rates_of(rows, count, shape):
-    """What rows ask of the velocities of all nodes: Σ b n, (count, n, 3)."""
+    """Constraint rows on the velocities of all nodes: Σ b n, (count, n, 3)."""
     rates = np.zeros((count, *shape))
     for k in range(count):
         for q in range(3):
@@ -115,7 +115,7 @@ def required_speeds(stage, rates):
 
 
 def disturbed_contact():
-    """A step in which a tip presses on some triangles, with other velocities and directions than it found."""
+    """A step in which a tip presses on some triangles; velocities are random, and directions are changed at random."""
     setup = pressed(ImplicitVolume(), frames=60, slide=0.01)
     state = None
     for _, state in frames_of(setup):
@@ -163,7 +163,7 @@ def test_contacts_and_volume_equal_the_full_saddle_point_solve():
     assert np.allclose(solution[len(mass) : -1], impulse[pressing], rtol=1e-6)
     assert solution[-1] == pytest.approx(pressure - lam, rel=1e-6)
     assert np.allclose(solution[: len(mass)], velocity.ravel()[free], atol=1e-9)
-    # What does not press is not missed, and complementarity leaves nothing over.
+    # Rows that do not press are not violated, and complementarity holds.
     gap = np.einsum("kij,ij->k", c, velocity) - required
     assert (gap > -1e-6 * np.abs(required).max()).all()
     assert np.abs(gap * impulse).max() < 1e-6 * np.abs(required).max() * impulse.max()

@@ -80,7 +80,7 @@ def some_rows(stage, rng, count=5):
     rows.weight[:count] = rng.dirichlet(np.ones(3), count)
     rows.direction[:count] = rng.normal(size=(count, 3))
     rows.direction[:count] /= np.linalg.norm(rows.direction[:count], axis=1)[:, None]
-    # The tip in their midst: some ask for a push, some for none.
+    # The tip at their centre: some rows need a push, others none.
     at = np.einsum("kq,kqi->ki", rows.weight[:count], nodes.x[rows.node[:count]])
     stage.tips.end[0, 0] = at.mean(axis=0)
     contacts.mode[:] = FREE

@@ -1,4 +1,4 @@
-"""Bodies that are cut in a run, where the truth is known: bodies without a cut, volumes before, affine motions."""
+"""Bodies that are cut in a run, against exact answers: bodies without a cut, volumes before, affine motions."""
 
 import itertools
 from dataclasses import replace

@@ -72,7 +72,7 @@ def test_a_correction_within_one_step_leaves_the_energy_of_the_formula(ball_body
 
 
 def blown_up(body, fraction: float, damping: float = 0.0):
-    """The history of a body whose volumes are asked to jump by 30 %, for a while of several oscillations."""
+    """The history of a body whose target volumes jump by 30 %, over several oscillations."""
     dt = fraction * step_limit(body).undamped
     jump = Ramp((0.0,), (JUMP,))
     with pytest.warns(UserWarning, match="limited to that rate"):

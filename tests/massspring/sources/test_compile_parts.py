@@ -12,7 +12,7 @@ from massspring.sources import ROOT
 
 @njit_inlined
 def share(row, place, included):
-    """A part of its callers alone."""
+    """Compiled as a part of its callers only."""
     return row[place] if included else 0.0
 
 

@@ -65,7 +65,7 @@ def kernel(x):
 
 @pytest.fixture(autouse=True)
 def no_arguments(monkeypatch):
-    """The kernels of the copies are given numbers, and their module is known: numba looks for it by its name."""
+    """The kernels of the copies take numbers, and `sys.modules` has their module: numba looks it up by name."""
     monkeypatch.setattr(compile_cache, "ARGUMENTS", ())
     monkeypatch.setitem(sys.modules, "massspring.kernel", ModuleType("massspring.kernel"))
 

@@ -88,7 +88,7 @@ def test_relative_imports_are_followed():
 
 
 def statements(tree: ast.Module) -> list[ast.stmt]:
-    """Of a package, with those for type checkers alone or for running alone."""
+    """Statements of a module, those below `if TYPE_CHECKING` or `if not TYPE_CHECKING` included."""
     body = []
     for node in tree.body:
         apart = isinstance(node, ast.If) and ast.unparse(node.test) in ("TYPE_CHECKING", "not TYPE_CHECKING")

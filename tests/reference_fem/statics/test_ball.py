@@ -94,7 +94,7 @@ def test_a_probe_is_carried_by_the_holders(probed):
 
 
 def test_a_probe_leaves_no_node_far_inside(probed):
-    """Vertices are between the points where contact is asked for: they may sink a little, not by a facet."""
+    """Contact acts at points between the vertices: a vertex may sink in a little, but not by a facet."""
     mesh, probe, path = probed
     x = nodes(mesh) + path[-1].u
     centre = np.asarray(probe.center) + probe.motion(path[-1].t)

@@ -116,7 +116,7 @@ def path(round_pair):
 
 @pytest.fixture(scope="module")
 def from_rest(path):
-    """The end of that."""
+    """The end of the fine ball's path."""
     return path[-1]
 
 
@@ -145,7 +145,7 @@ def as_it_presses(system, state):
 
 
 def test_a_carried_state_is_that_of_the_coarse_mesh(start, coarse_end, round_pair):
-    """Held unknowns have the values that they are held at, contact points the pressure of their nearest neighbour."""
+    """Held unknowns have their prescribed values, contact points the pressure of their nearest neighbour."""
     system, state = start
     coarse, coarse_state = coarse_end
     fine_nodes = nodes(round_pair[1])
@@ -198,7 +198,7 @@ def test_a_carried_state_is_stable_under_a_probe_too(monkeypatch):
 
 
 def failing(monkeypatch, times):
-    """Makes the first so many steps fail; the dead forces of all that were tried, and the iterations of the others."""
+    """Makes the first `times` steps fail; the dead forces of all steps, and the iterations of those that succeed."""
     forces, iterations = [], []
 
     def step(system, state, t, load, more=0.0):
@@ -264,7 +264,7 @@ def test_the_missing_forces_hold_a_carried_state_as_it_is(straight):
 
 @pytest.mark.parametrize("body", ["solid", "hollow"])
 def test_a_step_from_an_inverted_element_fails_as_one_that_a_shorter_one_may_replace(body):
-    """Of a closed lumen NumPy's own error came through, and the reference was lost."""
+    """With a closed lumen NumPy's own error came through once, and the reference was lost."""
     system = System(heavy(block((2, 2, 2))) if body == "solid" else closed_problem(), NewtonSettings())
     state = system.rest()
     state.x[2 : system.displacement_count : 3] -= 2.5 * nodes(system.problem.mesh)[:, 2]
@@ -287,7 +287,7 @@ def cube():
 
 @pytest.mark.parametrize("kind", ["middle", "vertex"])
 def test_an_inverted_element_is_made_upright(cube, kind):
-    """A middle that is far from between its ends, or a vertex that has gone through a face."""
+    """A mid-side node far from the middle of its edge, or a vertex that has gone through a face."""
     mesh = cube.problem.mesh
     x, rest = np.zeros(cube.total), nodes(mesh)
     inner = np.flatnonzero((rest > 0.2).all(axis=1) & (rest < 0.8).all(axis=1))
