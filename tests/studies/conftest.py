@@ -36,8 +36,8 @@ def solved(run_folder):
 
 
 @pytest.fixture(scope="session")
-def found(solved):
-    """That reference."""
+def reference(solved):
+    """The reference of the octant."""
     return load_reference(solved, SCENE)
 
 
@@ -93,7 +93,7 @@ def tiny_file(tmp_path):
 @pytest.fixture
 def opened(monkeypatch):
     """Names of the results files that are read, as they are."""
-    found = []
+    names = []
     check = opening.check_seal
-    monkeypatch.setattr(opening, "check_seal", lambda path: found.append(path.name) or check(path))
-    return found
+    monkeypatch.setattr(opening, "check_seal", lambda path: names.append(path.name) or check(path))
+    return names

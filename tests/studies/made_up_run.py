@@ -1,4 +1,4 @@
-"""A run whose numbers are known beforehand: four frames of a cube that is shifted and stretched."""
+"""A run with exact numbers: four frames of a cube that is shifted and stretched."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -32,7 +32,7 @@ SHIFT = np.array([0.03, 0.0, 0.0])
 
 
 UNCERTAINTIES = ("force", "force_end", "surface", "interior", "silhouette", "volume", "pressure", "lumen", "frequency")
-"""Quantities whose floors tests know: 1 %, 2 % and so on; those that METRICS has beside them follow."""
+"""Quantities whose floors tests know: 1 %, 2 % and so on; those that METRICS has besides follow."""
 
 
 ATTRIBUTES = {
@@ -59,7 +59,7 @@ ATTRIBUTES = {
 
 
 def bend(x, checkpoint=-1):
-    """A displacement that varies: a rigid shift and a tenth of stretch along z, whenever asked."""
+    """A displacement that varies: a rigid shift and a tenth of stretch along z, at every checkpoint."""
     return SHIFT + np.column_stack([0 * x[:, 0], 0 * x[:, 1], 0.1 * x[:, 2]])
 
 

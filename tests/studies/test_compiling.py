@@ -1,4 +1,4 @@
-"""Code that is compiled beforehand: which forms there are, that they run, that it happens once, and what is said."""
+"""Code that is compiled beforehand: which forms there are, that they run, that it happens once, and what is printed."""
 
 import sys
 
@@ -26,11 +26,11 @@ def own_folder(tmp_path, monkeypatch):
 
 
 def test_every_method_is_there_in_each_form_that_it_supports():
-    found = variants()
-    assert {variant.method for variant in found} == {*(method() for method in (*METHODS, *LITERATURE)), *VARIANTS}
-    assert len({variant.name for variant in found}) == len(found)
+    forms = variants()
+    assert {variant.method for variant in forms} == {*(method() for method in (*METHODS, *LITERATURE)), *VARIANTS}
+    assert len({variant.name for variant in forms}) == len(forms)
     for method in (*METHODS, *LITERATURE):
-        own = [variant for variant in found if variant.method == method()]
+        own = [variant for variant in forms if variant.method == method()]
         table = method.capabilities
         assert {variant.option for variant in own} == {
             option for option, yes in ((PLAIN, True), (PROBE, table.thin_probes), (THREADS, table.threads)) if yes
@@ -42,16 +42,16 @@ def test_every_method_is_there_in_each_form_that_it_supports():
 
 def test_options_are_compiled_for_every_method_that_has_them_and_not_for_all_that_they_go_with():
     """What no test and no main study asks for is compiled when a user does."""
-    found = {(one.method.name, one.kind, one.precision) for one in variants() if one.option != PLAIN}
-    assert {kind for name, kind, _ in found if name == "free"} == {"whole"}
-    assert {kind for name, kind, _ in found if name == "implicit_volume"} == set(OWN_TYPES)
-    assert {(name, kind) for name, kind, precision in found if precision == "float32"} == {
+    forms = {(one.method.name, one.kind, one.precision) for one in variants() if one.option != PLAIN}
+    assert {kind for name, kind, _ in forms if name == "free"} == {"whole"}
+    assert {kind for name, kind, _ in forms if name == "implicit_volume"} == set(OWN_TYPES)
+    assert {(name, kind) for name, kind, precision in forms if precision == "float32"} == {
         ("free", "whole"),
         ("implicit_volume", "whole"),
     }
 
 
-def test_the_shared_kernels_come_first_and_the_reference_beside_them():
+def test_the_shared_kernels_and_the_reference_come_first():
     names = list(tasks.tasks())
     kinds = [variant.kind for variant in variants()]
     assert kinds.index("nodal") > max(k for k, kind in enumerate(kinds) if kind in OWN_TYPES)
@@ -117,11 +117,11 @@ def test_compiling_is_logged_with_its_own_time_and_loading_is_not():
     def outer(x):
         return inner(x) * 2
 
-    with watching() as found:
+    with watching() as watch:
         outer(1.0), outer(2.0)
-    assert [entry.function.rpartition(".")[2] for entry in found.compiled] == ["inner", "outer"]
-    assert all(0 < entry.seconds < 60 and "float64" in entry.arguments for entry in found.compiled)
-    text = listing(found.compiled)
+    assert [entry.function.rpartition(".")[2] for entry in watch.compiled] == ["inner", "outer"]
+    assert all(0 < entry.seconds < 60 and "float64" in entry.arguments for entry in watch.compiled)
+    text = listing(watch.compiled)
     assert text.count("\n") == 3 and ".inner," in text
 
 
@@ -137,7 +137,7 @@ def test_the_summary_counts_what_was_compiled_twice():
     assert lines[1].split() == ["5.00", "s", "1", "x", "b"] and len(lines) == 2
 
 
-def test_nothing_is_said_or_done_when_it_is_there(own_folder, monkeypatch, capsys):
+def test_nothing_is_printed_or_done_when_it_is_there(own_folder, monkeypatch, capsys):
     monkeypatch.setattr(sys, "argv", ["compiling"])
     monkeypatch.setattr(main, "compile_all", lambda names: pytest.fail("compiled again"))
     assert not tasks.is_done(True) and not tasks.is_done(False)

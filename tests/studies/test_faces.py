@@ -81,7 +81,7 @@ def test_a_command_loads_what_it_needs(words, loaded, tmp_path):
     assert set(done.stderr.splitlines()[-1].split()) <= set(loaded)
 
 
-def test_every_chart_of_the_catalogue_is_found():
+def test_every_chart_of_the_catalogue_is_listed():
     for study in STUDIES:
         for chart in study.charts:
             assert chart.draw is import_module(str(chart.drawing).split(":")[0]).draw

@@ -1,4 +1,4 @@
-"""What a sweep would run is what it runs; how long it takes is read off what ran before; compiling is told."""
+"""What a sweep would run is what it runs; how long it takes is read off what ran before; compiling is reported."""
 
 import io
 import re
@@ -33,26 +33,26 @@ def stale(root, case):
 
 
 def test_from_nothing_everything_is_planned_with_an_estimate_by_its_size(tmp_path):
-    found = plan(Ledger(tmp_path), tiny_study())
-    assert sorted(p.kind for p in found) == ["case"] * 3 + ["timing"] * 3
-    assert {p.seconds for p in found} == {None}
-    assert {p.why for p in found} == {MISSING}
-    assert all(p.guess > 0 and not p.here for p in found) and expected(found, 2) > 0
+    pieces = plan(Ledger(tmp_path), tiny_study())
+    assert sorted(p.kind for p in pieces) == ["case"] * 3 + ["timing"] * 3
+    assert {p.seconds for p in pieces} == {None}
+    assert {p.why for p in pieces} == {MISSING}
+    assert all(p.guess > 0 and not p.here for p in pieces) and expected(pieces, 2) > 0
 
 
 def test_what_is_planned_is_what_runs(results):
     path = stale(results, tiny_case(timed=True))
     timing_file(results, "tiny", tiny_study().cases[1]).unlink()
-    found = plan(Ledger(results), tiny_study())
-    assert [(p.stage, p.label, p.why) for p in found] == [
+    pieces = plan(Ledger(results), tiny_study())
+    assert [(p.stage, p.label, p.why) for p in pieces] == [
         (PHYSICS, tiny_case().name, CODE_CHANGED),
         (TIMING, tiny_study().cases[1].name, MISSING),
     ]
-    assert found[0].seconds == peek(path).attributes["seconds"] > 0
-    assert found[1].seconds is None
+    assert pieces[0].seconds == peek(path).attributes["seconds"] > 0
+    assert pieces[1].seconds is None
     watched = Silent()
     assert run_studies(results, [tiny_study()], 1, watched) == 2
-    assert watched.done == [(p.stage, p.label) for p in found]
+    assert watched.done == [(p.stage, p.label) for p in pieces]
     assert plan(Ledger(results), tiny_study()) == []
 
 
@@ -68,16 +68,16 @@ def piece(stage, kind, seconds):
 
 
 def test_the_estimate_shares_the_physics_and_not_the_timing():
-    known = [piece(PHYSICS, "case", 4.0), piece(PHYSICS, "case", 2.0), piece(TIMING, "timing", 5.0)]
-    assert expected(known, 1) == pytest.approx(11.0)
-    assert expected(known, 2) == pytest.approx(8.0)
-    assert expected([*known, replace(piece(PHYSICS, "case", None), guess=3.0)], 1) == pytest.approx(14.0)
+    pieces = [piece(PHYSICS, "case", 4.0), piece(PHYSICS, "case", 2.0), piece(TIMING, "timing", 5.0)]
+    assert expected(pieces, 1) == pytest.approx(11.0)
+    assert expected(pieces, 2) == pytest.approx(8.0)
+    assert expected([*pieces, replace(piece(PHYSICS, "case", None), guess=3.0)], 1) == pytest.approx(14.0)
     assert expected([replace(piece(PHYSICS, "case", 2.0), guess=3.0)], 1) == pytest.approx(2.0), "measured counts first"
 
 
-@pytest.mark.parametrize(("seconds", "said"), [(0.2, "1 s"), (80, "80 s"), (200, "3 min"), (6000, "1 h 40 min")])
-def test_times_in_words(seconds, said):
-    assert words(seconds) == said
+@pytest.mark.parametrize(("seconds", "text"), [(0.2, "1 s"), (80, "80 s"), (200, "3 min"), (6000, "1 h 40 min")])
+def test_times_in_words(seconds, text):
+    assert words(seconds) == text
 
 
 def test_a_dry_run_says_it_all_and_runs_nothing(organbench, tiny_file, results, tmp_path):
@@ -96,7 +96,7 @@ def test_a_dry_run_says_it_all_and_runs_nothing(organbench, tiny_file, results, 
     assert out.strip() == "tiny: nothing would run: all results are current"
 
 
-def test_a_disk_without_room_is_told_beforehand(organbench, tiny_file, tmp_path, monkeypatch):
+def test_a_disk_without_room_is_named_beforehand(organbench, tiny_file, tmp_path, monkeypatch):
     monkeypatch.setattr(progress, "free_bytes", lambda folder: 1000)
     code, out, _ = organbench("run", tiny_file, "--dry-run", "--results", tmp_path / "empty")
     assert code == 0 and re.search(r"about [\d.]+ kB, more than the 1\.0 kB that are free: make room", out)
@@ -108,18 +108,18 @@ def test_the_room_is_that_of_the_disk_on_which_the_folder_will_lie(tmp_path):
 
 def test_bytes_are_those_of_the_last_time_or_of_what_is_recorded(results):
     path = stale(results, tiny_case(timed=True))
-    (known, *_) = plan(Ledger(results), tiny_study())
-    assert known.size == path.stat().st_size
+    (stored, *_) = plan(Ledger(results), tiny_study())
+    assert stored.size == path.stat().st_size
     path.unlink()
-    (guessed,) = [p for p in plan(Ledger(results), tiny_study()) if p.label == known.label and p.stage == PHYSICS]
-    assert guessed.size is not None and 0.5 < guessed.size / known.size < 2.0
+    (estimated,) = [p for p in plan(Ledger(results), tiny_study()) if p.label == stored.label and p.stage == PHYSICS]
+    assert estimated.size is not None and 0.5 < estimated.size / stored.size < 2.0
 
 
-def test_references_count_as_the_mean_of_those_that_are_known():
-    known, unknown = (replace(piece(PHYSICS, "reference", 1.0), size=size) for size in (300, None))
+def test_references_without_a_size_count_as_the_mean_of_the_others():
+    sized, unsized = (replace(piece(PHYSICS, "reference", 1.0), size=size) for size in (300, None))
     case = replace(piece(PHYSICS, "case", 1.0), size=10)
-    assert expected_bytes([known, unknown, case]) == (610, 0)
-    assert expected_bytes([unknown, unknown, case]) == (10, 2)
+    assert expected_bytes([sized, unsized, case]) == (610, 0)
+    assert expected_bytes([unsized, unsized, case]) == (10, 2)
 
 
 def log() -> Console:
@@ -147,9 +147,9 @@ def test_a_log_has_one_line_on_compiling_and_then_rests():
     with TerminalProgress(console) as progress:
         for name in ("free_frame", "free_frame", "other"):
             progress.compiling(name)
-    with compiling(console, "measuring") as told:
-        told("free_frame")
-        told("other")
+    with compiling(console, "measuring") as show:
+        show("free_frame")
+        show("other")
     assert lines(console) == ["compiling free_frame (kept for the next time)"] * 2
     assert QUIET_SECONDS > 1
 

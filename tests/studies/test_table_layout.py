@@ -1,4 +1,4 @@
-"""The table on the terminal: as wide as it is, values with their uncertainty, what differs beside what is shared."""
+"""The table on the terminal: as wide as it is, values with their uncertainty, shared settings in one line."""
 
 import pytest
 
@@ -32,7 +32,7 @@ def row(scene="ball", method="free", **changes):
     return {"scene": scene, "body": "surface", "method": method, **settings, **numbers, **changes}
 
 
-def test_what_all_share_is_said_once_and_what_differs_is_a_column(organbench, capsys):
+def test_what_all_share_is_printed_once_and_what_differs_is_a_column(organbench, capsys):
     table.draw([row(), row(method="implicit_volume", nodes=150)], CHOSEN, False)
     first, *rest = capsys.readouterr().out.splitlines()
     assert first == "law van_gelder, stiffness 1, dt = 0.5 dt_c"
@@ -66,7 +66,7 @@ def test_lines_fit_and_say_what_is_left_out(monkeypatch, capsys, width):
     assert not any(line.startswith("not shown") for line in out)
 
 
-def test_how_a_run_ended_is_told_where_one_did_not_end_well(capsys):
+def test_the_status_is_a_column_where_a_run_did_not_end_well(capsys):
     table.draw([row(), row(method="penalty", status="diverged")], CHOSEN, False)
     out = capsys.readouterr().out.splitlines()
     assert out[-1].split()[:2] == ["penalty", "diverged"] and out[-2].split()[:2] == ["free", "ok"]

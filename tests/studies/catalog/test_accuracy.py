@@ -38,7 +38,7 @@ def test_it_has_every_scene_of_which_force_or_displacement_is_compared():
     assert all(case.timed for case in ACCURACY.cases if case.body.kind != "quadratic")
 
 
-def test_a_case_is_found_by_its_name():
+def test_readable_names_of_cases_are_unique():
     names = [readable(case.name) for case in ACCURACY.cases]
     assert len(set(names)) == len(names)
 

@@ -31,7 +31,7 @@ def _problem_by_name(name):
     return coarse_problem(scene)
 
 
-def known_problem(scene):
+def small_problem(scene):
     """The reference problem of a scene on a coarse mesh, once for all tests, which only read it."""
     return _problem_by_name(scene.name) if scene in JUDGED else coarse_problem(scene)
 
@@ -51,7 +51,7 @@ def few(scene):
 
 def load_gap(drive_scene, problem_scene) -> float:
     """Largest distance [m] between where the two solvers put their obstacles and held regions, over the whole clock."""
-    setup, problem = small_setup(drive_scene).setup, known_problem(problem_scene)
+    setup, problem = small_setup(drive_scene).setup, small_problem(problem_scene)
     kept = [drive_scene.obstacles.index(o) for o in kept_obstacles(drive_scene)]
     gaps = []
     for frame in range(setup.clock.frames):
@@ -76,7 +76,7 @@ def moves(scene) -> bool:
 
 
 def test_the_reference_problem_can_be_set_up(judged):
-    problem = known_problem(judged)
+    problem = small_problem(judged)
     System(problem, NewtonSettings()).solver.release()
     assert problem.material.mu == judged.tissue.shear_modulus
     assert problem.material.kappa == judged.tissue.shear_modulus * judged.tissue.bulk_over_shear
@@ -104,7 +104,7 @@ def _later(scene):
 
 
 def test_both_solvers_see_the_same_obstacles(judged):
-    problem = known_problem(judged)
+    problem = small_problem(judged)
     for obstacle, rigid in zip(kept_obstacles(judged), problem.obstacles, strict=True):
         if isinstance(obstacle, Plane):
             np.testing.assert_allclose(rigid.normal, obstacle.unit_normal, rtol=0, atol=1e-15)
@@ -119,7 +119,7 @@ def test_both_solvers_see_the_same_obstacles(judged):
 def test_both_solvers_hold_the_same_region(judged):
     if judged.symmetric or not judged.held:
         return
-    problem = known_problem(judged)
+    problem = small_problem(judged)
     mesh, level = mesh_for(judged, few(judged), on_shape=True), few(judged)
     while (
         len(mesh.points) < problem.mesh.nvertices
@@ -127,8 +127,8 @@ def test_both_solvers_hold_the_same_region(judged):
         level = round(FINER * level)
         mesh = mesh_for(judged, level, on_shape=True)
     assert len(mesh.points) == problem.mesh.nvertices
-    for held, found in zip(judged.held, find_held(problem), strict=True):
-        corners = found.nodes[found.nodes < len(mesh.points)]
+    for held, group in zip(judged.held, find_held(problem), strict=True):
+        corners = group.nodes[group.nodes < len(mesh.points)]
         patch = patch_nodes(mesh, held.name, held.region)
         # The reference may leave out a node of the outline that no whole facet of the region reaches.
         assert set(corners) <= set(patch)

@@ -97,7 +97,7 @@ def representatives(cases):
 def check_prepared(case):
     try:
         prepared = prepare(case)
-    except DoesNotApply as error:  # the literature's methods are asked for in every scene
+    except DoesNotApply as error:  # the literature's methods are cases of every scene
         reason, prepared = str(error), None
     if prepared is None:
         assert type(case.method) in LITERATURE and len(reason) > 40

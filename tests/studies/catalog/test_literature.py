@@ -54,8 +54,8 @@ def test_a_replay_is_equal_to_the_last_bit(ran):
 def test_metrics_without_a_reference_are_numbers(ran):
     case, path = ran
     run = Run(case, read_record(path), None, None)
-    found = {metric.name: metric(run) for metric in METRICS if metric.name in ("volume_worst", "min_j", "j_spread")}
-    assert np.isfinite(list(found.values())).all() and 0.5 < found["volume_worst"] < 20.0
+    values = {metric.name: metric(run) for metric in METRICS if metric.name in ("volume_worst", "min_j", "j_spread")}
+    assert np.isfinite(list(values.values())).all() and 0.5 < values["volume_worst"] < 20.0
 
 
 @pytest.mark.parametrize(
@@ -85,8 +85,8 @@ def test_settings_are_part_of_the_name_of_a_case():
 
 
 @pytest.mark.parametrize("scene", judged_at_rest(), ids=lambda scene: scene.name)
-def test_each_stands_once_beside_ours_in_every_scene(scene):
-    found = [case for case in LITERATURE_STUDY.cases if case.scene == scene]
-    others = [case for case in found if type(case.method) in LITERATURE]
-    assert [type(case.method) for case in others] == list(LITERATURE) and len(found) == len(others) + 2
+def test_each_is_one_case_next_to_ours_in_every_scene(scene):
+    cases = [case for case in LITERATURE_STUDY.cases if case.scene == scene]
+    others = [case for case in cases if type(case.method) in LITERATURE]
+    assert [type(case.method) for case in others] == list(LITERATURE) and len(cases) == len(others) + 2
     assert not any(case.method.capabilities.conditionally_stable for case in others if case.dt != "auto")

@@ -1,4 +1,4 @@
-"""What metrics say of made-up runs whose numbers are known beforehand."""
+"""What metrics give for made-up runs with exact numbers."""
 
 import numpy as np
 import pytest
@@ -72,9 +72,9 @@ def test_mean_error_counts_a_node_by_its_share_of_the_area(corner):
     final = POINTS + SHIFT
     final[corner] += 0.1 * SHIFT
     share = (corner == TRIANGLES).sum() / (3 * len(TRIANGLES))  # all triangles of the cube have the same area
-    found = of("mean_error", final=final, reference=even)
-    assert found == pytest.approx(10 * share, rel=1e-9, abs=1e-10)
-    assert found != pytest.approx(10 / len(POINTS), rel=0.05)  # what the plain mean would be
+    error = of("mean_error", final=final, reference=even)
+    assert error == pytest.approx(10 * share, rel=1e-9, abs=1e-10)
+    assert error != pytest.approx(10 / len(POINTS), rel=0.05)  # what the plain mean would be
 
 
 def test_weights_are_the_masses_inside_and_the_areas_outside():

@@ -57,9 +57,9 @@ def shown(home):
 def test_tables_charts_and_the_summary_are_copied(current, home):
     copies, absent = publish(current, [HEADLINE], home)
     names = {copy.relative_to(home / PUBLISHED).as_posix() for copy in copies}
-    wanted = {"volume_loss/one.png", "volume_loss/volume_loss.csv", "summary.md", "kept_volume.csv", "machine.json"}
-    assert names == {*wanted, FILE} and absent == list(EXTRAS)
-    for name in wanted:
+    files = {"volume_loss/one.png", "volume_loss/volume_loss.csv", "summary.md", "kept_volume.csv", "machine.json"}
+    assert names == {*files, FILE} and absent == list(EXTRAS)
+    for name in files:
         assert (home / PUBLISHED / name).read_bytes() == (current / name).read_bytes()
     text = (home / PAGE).read_text()
     assert (current / "summary.md").read_text() in text and "old" not in text
@@ -89,8 +89,8 @@ def test_what_nothing_makes_any_more_goes_and_what_was_not_made_again_stays(curr
     assert (home / PUBLISHED / "verify/verify.csv").read_text() == "old"
     assert (home / PUBLISHED / "population/population.csv").read_text() == "old"
     assert (home / PUBLISHED / "bench.csv").read_text() == "new"
-    known = noted(home / PUBLISHED)
-    assert known["verify"] == "hash" and "bench.csv" in known
+    digests = noted(home / PUBLISHED)
+    assert digests["verify"] == "hash" and "bench.csv" in digests
 
 
 def miss(root, monkeypatch):
@@ -191,10 +191,10 @@ def test_git_sees_what_is_published_and_nothing_else_below_results(tmp_path):
     own += [f"{study.name}/{name}" for study in STUDIES for name in (f"{study.name}.csv", "a.h5", "a.timing.b.h5")]
     own += [f"{study.name}/{chart.file}" for study in STUDIES for chart in study.charts]
     paths = ["results/" + name for name in own] + [(PUBLISHED / name).as_posix() for name in own]
-    asked = subprocess.run(
+    ignored = subprocess.run(
         ["git", "check-ignore", *paths], cwd=tmp_path, capture_output=True, text=True, check=True
     ).stdout.splitlines()
-    assert asked == paths[: len(own)]
+    assert ignored == paths[: len(own)]
 
 
 def test_a_table_goes_between_its_marks():

@@ -64,8 +64,8 @@ def test_each_result_without_a_study_names_the_modules_that_make_it(name):
 
 @pytest.fixture
 def two_steps(monkeypatch, tmp_path):
-    """A plan of two steps in place of the whole, its commands not run but kept; the second fails when told so."""
-    found = [Step("python -m studies.bench.meshes", ("geometry.csv",)), Step("make bench", ("bench.csv",))]
+    """A plan of two steps, whose commands are kept instead of run; the second fails if a test says so."""
+    plan = [Step("python -m studies.bench.meshes", ("geometry.csv",)), Step("make bench", ("bench.csv",))]
     ran, fails = [], []
 
     def run(words, **_):
@@ -75,7 +75,7 @@ def two_steps(monkeypatch, tmp_path):
         set_stamp(tmp_path, {"studies.bench.meshes": "geometry.csv", "bench": "bench.csv"}[words[-1]])
         return subprocess.CompletedProcess(words, 0)
 
-    monkeypatch.setattr(release, "steps", lambda: found)
+    monkeypatch.setattr(release, "steps", lambda: plan)
     monkeypatch.setattr(release, "check_commit", lambda home: "0" * 40)
     monkeypatch.setattr(release, "check_complete", lambda published, all_steps: None)
     monkeypatch.setattr(release.crosscheck, "available", lambda: True)

@@ -46,5 +46,5 @@ def test_the_other_loads_are_those_of_the_titles():
 
 def test_tissue_is_as_nearly_incompressible_as_the_theory_says():
     """kappa/mu of the reference; that it reaches the solver, test_scenes.py holds."""
-    (said,) = re.findall(r"kappa/mu = (\d+)", (ROOT / "docs/theory.md").read_text(encoding="utf-8"))
-    assert {scene.tissue.bulk_over_shear for scene in SCENES} == {float(said)}
+    (ratio,) = re.findall(r"kappa/mu = (\d+)", (ROOT / "docs/theory.md").read_text(encoding="utf-8"))
+    assert {scene.tissue.bulk_over_shear for scene in SCENES} == {float(ratio)}

@@ -7,7 +7,7 @@ from studies.scene.library import SCENES as ALL_SCENES
 SCENES = {"ball_squeeze": 1, "ball_clamped": 2, "liver_press": 3}
 
 
-def test_a_known_name_gives_its_item():
+def test_a_name_of_the_list_gives_its_item():
     assert lookup("ball_clamped", SCENES, "scene") == 2
     assert lookup("ball_clamped", list(SCENES), "scene") == "ball_clamped"
 
@@ -16,8 +16,8 @@ def test_a_known_name_gives_its_item():
 def test_a_typo_is_answered_with_the_nearest_name(typo):
     with pytest.raises(StudyError) as problem:
         lookup(typo, SCENES, "scene")
-    known = "ball_clamped, ball_squeeze, liver_press"
-    assert str(problem.value) == f"unknown scene {typo!r}; did you mean 'ball_squeeze' (known are {known})?"
+    names = "ball_clamped, ball_squeeze, liver_press"
+    assert str(problem.value) == f"unknown scene {typo!r}; did you mean 'ball_squeeze' (known are {names})?"
 
 
 def test_nothing_near_suggests_nothing():
@@ -26,7 +26,7 @@ def test_nothing_near_suggests_nothing():
     assert str(problem.value) == "unknown scene 'zzz'; known are ball_clamped, ball_squeeze, liver_press"
 
 
-def test_many_names_are_cut_and_none_are_said():
+def test_a_long_list_is_cut_and_an_empty_one_is_named_as_such():
     with pytest.raises(StudyError, match=r"known are field_00, .*, field_08 and 41 more$") as problem:
         lookup("q", [f"field_{i:02d}" for i in range(50)], "field")
     assert len(str(problem.value)) < 140

@@ -58,15 +58,15 @@ def test_the_cheapest_body_that_suffices_stands_beside_the_papers():
 
 
 @pytest.mark.parametrize(
-    ("found", "named"),
+    ("candidates", "named"),
     [
         ([run(PAPER, -0.7), run(EVEN, -0.05)], "594"),
         ([run(PAPER, -0.7), run(GRADED, 0.01, uncertainty=0.2)], "794"),
     ],
     ids=["none suffices", "the reference cannot tell"],
 )
-def test_the_nearest_is_marked(found, named):
-    row, note = (line for line in recommended_of(found).splitlines()[2:] if line)
+def test_the_nearest_is_marked(candidates, named):
+    row, note = (line for line in recommended_of(candidates).splitlines()[2:] if line)
     assert f"{named}, 0.8 ‡" in row and note.startswith("‡")
 
 

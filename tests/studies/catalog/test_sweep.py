@@ -27,8 +27,8 @@ def content(folder):
 
 
 def counts(root, study):
-    found = [standing.status for standing in standings(Ledger(root), study)]
-    return {status: found.count(status) for status in found}
+    statuses = [standing.status for standing in standings(Ledger(root), study)]
+    return {status: statuses.count(status) for status in statuses}
 
 
 def test_everything_once(finished_sweep):
@@ -94,7 +94,7 @@ def test_a_damaged_file_is_stale_and_runs_again(results, number):
     assert load_runs(results, study)[1] == []
 
 
-def test_only_what_is_asked_for(results):
+def test_only_what_the_filter_lets_through(results):
     study = tiny_study()
     age(results, tiny_case())
     path = case_path(results, "tiny", diverging_case())
@@ -106,7 +106,7 @@ def test_only_what_is_asked_for(results):
     assert counts(results, study) == {"ok": 1, "stale": 1, "diverged": 1}
 
 
-def test_missing_is_told(tmp_path):
+def test_missing_cases_are_remarked_on(tmp_path):
     study = tiny_study()
     assert counts(tmp_path, study) == {"missing": 3}
     runs, remarks = load_runs(tmp_path, study)
@@ -136,14 +136,14 @@ def test_a_study_scene_by_scene_finishes_one_before_the_next_and_after_the_other
     assert [name for name, _ in together[2:]] == [study.name, study.name, "turns", "turns"]
 
 
-def test_results_that_cannot_be_written_are_told_before_anything_runs(tmp_path, monkeypatch):
+def test_a_folder_that_cannot_be_written_to_is_refused_before_anything_runs(tmp_path, monkeypatch):
     (tmp_path / "file").write_text("no folder")
     monkeypatch.setattr(Local, "map", lambda *_: pytest.fail("nothing may run"))
     with pytest.raises(StudyError, match="choose a folder that can be written to"):
         run_studies(tmp_path / "file", [tiny_study()], 1, Silent())
 
 
-def test_files_of_the_former_layout_run_again_and_are_told_of_once(results):
+def test_files_of_the_former_layout_run_again_and_share_one_remark(results):
     study = tiny_study()
     for case in study.cases:
         with h5py.File(case_path(results, "tiny", case), "w") as file:

@@ -59,13 +59,13 @@ def solution(force) -> Any:
 
 
 @pytest.mark.parametrize(("share", "met"), [(0.0, True), (1.2, True), (1.6, False)])
-def test_a_reference_beyond_its_bar_and_the_judges_change_is_off(found, share, met):
+def test_a_reference_beyond_its_bar_and_the_judges_change_is_off(reference, share, met):
     """The judge is moved away by so many bars; it changes by half a bar from its coarse mesh to its fine one."""
-    bar = found.total_uncertainty["force_end"]
-    theirs = found.force[-1] / (1 + share * bar)
+    bar = reference.total_uncertainty["force_end"]
+    theirs = reference.force[-1] / (1 + share * bar)
     coarse, fine = MeridianMesh(0.2, 0), MeridianMesh(0.1, 0)
     answers = {coarse: solution(theirs * (1 + bar / 2)), fine: solution(theirs)}
-    (check,) = verdict(Judge(SCENE, lambda mesh: answers[mesh], coarse, fine), found).checks
+    (check,) = verdict(Judge(SCENE, lambda mesh: answers[mesh], coarse, fine), reference).checks
     assert bool(check.met) is met
     assert check.tolerance == pytest.approx(1.5 * bar, rel=1e-9)
 

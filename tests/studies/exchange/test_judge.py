@@ -32,9 +32,9 @@ def judged(path, **options) -> Run:
     return run_of_entry(entry_record(SCENE, path, "theirs", NODES, **options), None)
 
 
-def test_our_own_run_gets_the_same_metrics(ours, found, tmp_path):
-    own = Run(CASE, measure(CASE), found)
-    entry = run_of_entry(entry_record(SCENE, ours.npz(tmp_path / "a.npz"), "theirs", NODES), found)
+def test_our_own_run_gets_the_same_metrics(ours, reference, tmp_path):
+    own = Run(CASE, measure(CASE), reference)
+    entry = run_of_entry(entry_record(SCENE, ours.npz(tmp_path / "a.npz"), "theirs", NODES), reference)
     compared = [metric for metric in METRICS if metric.name not in ("alternation",) and metric(own) == metric(own)]
     assert {"force_end", "force_error", "silhouette_error", "volume_worst", "min_j", "pressure_error", "sway"} <= {
         metric.name for metric in compared
@@ -110,7 +110,7 @@ def test_every_form_holds_the_same_positions(ours, tmp_path, form):
     assert np.isnan(run.force).all()  # they hold none
 
 
-def test_an_entry_stands_in_tables_and_charts_beside_ours(organbench, ours, found, results, scene_file, tmp_path):
+def test_an_entry_stands_in_tables_and_charts_beside_ours(organbench, ours, reference, results, scene_file, tmp_path):
     force = tmp_path / "force.csv"
     force.write_text(
         "t,force\n" + "\n".join(f"{float(t)!r},{float(f)!r}" for t, f in zip(ours.t, ours.force, strict=True))
@@ -122,7 +122,7 @@ def test_an_entry_stands_in_tables_and_charts_beside_ours(organbench, ours, foun
     (stored,) = entry_files(results)
     (row,) = [line for line in out.splitlines() if "force_end" in line]
     metric = next(m for m in judged_metrics(SCENE) if m.name == "force_end")
-    expected = metric(run_of_entry(read_record(stored), found))
+    expected = metric(run_of_entry(read_record(stored), reference))
     assert float(row.split()[1].replace("−", "-")) == pytest.approx(expected, abs=0.6)
     study = tmp_path / "mine.py"
     study.write_text(

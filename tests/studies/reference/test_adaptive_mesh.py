@@ -28,11 +28,11 @@ BODY = BodyRecipe("quadratic", NODES, graded="adaptive", mass="stiffness")
 @pytest.fixture(scope="module")
 def solved(mesh_cache):
     """The mesh, and the error indicator that it comes from."""
-    found = []
+    entries = []
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(module, "cached", lambda *asked: found.append(cached(*asked)) or found[0])
+        patch.setattr(module, "cached", lambda *arguments: entries.append(cached(*arguments)) or entries[0])
         mesh = mesh_of(LIVER_PROBE, BODY)
-    return mesh, found[0]["indicator"]
+    return mesh, entries[0]["indicator"]
 
 
 @pytest.fixture(scope="module")
@@ -40,7 +40,7 @@ def mesh(solved):
     return solved[0]
 
 
-def test_it_has_the_wanted_nodes_and_stands_upright(mesh):
+def test_it_has_as_many_nodes_as_its_recipe_says_and_stands_upright(mesh):
     assert NODES <= mesh.outer_count <= 1.06 * NODES and mesh.smallest_jacobian > 0.0
     assert abs(held_area_error(LIVER_PROBE, mesh, LIVER_PROBE.held[0])) < 0.03
 
@@ -119,14 +119,14 @@ def test_elements_at_an_outline_stop_where_the_stretch_would_be_too_large():
 
 
 def test_a_hanging_organ_is_adapted_and_large_strains_stop_it_at_its_outline(mesh_cache):
-    wanted = 494
-    organ_mesh, coarse = coarse_mesh(SPLEEN_SAG, wanted)
+    count = 494
+    organ_mesh, coarse = coarse_mesh(SPLEEN_SAG, count)
     indicator, stretch = indicators_of(SPLEEN_SAG, organ_mesh, coarse)
     least = least_edge(coarse, stretch)
     size = np.linalg.norm(np.ptp(organ_mesh.points, axis=0))
     assert 0.03 * size < least < 0.08 * size
-    assert mesh_of(SPLEEN_SAG, replace(BODY, nodes=wanted)).outer_count >= wanted
-    free, kept = (adapted(coarse, indicator, 2 * wanted, bound) for bound in (0.0, least))
+    assert mesh_of(SPLEEN_SAG, replace(BODY, nodes=count)).outer_count >= count
+    free, kept = (adapted(coarse, indicator, 2 * count, bound) for bound in (0.0, least))
     assert len(kept.at_outlines()) < 0.95 * len(free.at_outlines())
 
 

@@ -33,24 +33,24 @@ def uniform() -> SimpleNamespace:
 
 @pytest.mark.parametrize("knife", [KNIFE, HalfSpace(KNIFE.point, (-0.3, -0.1, 1.0))])
 def test_a_uniform_deformation_is_pulled_back_exactly(knife):
-    found = pulled_back(uniform(), 1, "knife", knife, BLADE)
-    assert found.plane_deviation < 1e-12 and found.front_deviation < 1e-12
+    pullback = pulled_back(uniform(), 1, "knife", knife, BLADE)
+    assert pullback.plane_deviation < 1e-12 and pullback.front_deviation < 1e-12
     normal = GRADIENT.T @ knife.normal  # of n . (F X + c - p) = 0
-    assert found.cut.plane.normal == pytest.approx(normal / np.linalg.norm(normal), abs=1e-12)
+    assert pullback.cut.plane.normal == pytest.approx(normal / np.linalg.norm(normal), abs=1e-12)
     random = np.random.default_rng(0).uniform(-1, 1, (400, 3))
     moved = random @ GRADIENT.T + [0.01, -0.02, 0.03]
-    assert np.array_equal(found.cut.plane.level(random) > 0, knife.level(moved) > 0)
-    in_plane = random - np.outer(found.cut.plane.level(random), found.cut.plane.normal)
+    assert np.array_equal(pullback.cut.plane.level(random) > 0, knife.level(moved) > 0)
+    in_plane = random - np.outer(pullback.cut.plane.level(random), pullback.cut.plane.normal)
     there = in_plane @ GRADIENT.T + [0.01, -0.02, 0.03]
-    assert np.array_equal(found.cut.within.level(in_plane) > 0, BLADE.level(there) > 0)
-    assert found.cut.at == BALL_INCISED.checkpoints[1]
+    assert np.array_equal(pullback.cut.within.level(in_plane) > 0, BLADE.level(there) > 0)
+    assert pullback.cut.at == BALL_INCISED.checkpoints[1]
 
 
 def test_before_any_load_the_knife_is_the_cut():
-    found = pulled_back(uniform(), 0, "knife", KNIFE)
-    assert found.cut.plane.level(np.array([KNIFE.point])) == pytest.approx(0.0, abs=1e-12)
-    assert found.cut.plane.normal == pytest.approx(KNIFE.normal / np.linalg.norm(KNIFE.normal), abs=1e-12)
-    assert found.cut.within is None
+    pullback = pulled_back(uniform(), 0, "knife", KNIFE)
+    assert pullback.cut.plane.level(np.array([KNIFE.point])) == pytest.approx(0.0, abs=1e-12)
+    assert pullback.cut.plane.normal == pytest.approx(KNIFE.normal / np.linalg.norm(KNIFE.normal), abs=1e-12)
+    assert pullback.cut.within is None
 
 
 def test_a_knife_that_bends_is_measured_and_refused():
@@ -59,9 +59,9 @@ def test_a_knife_that_bends_is_measured_and_refused():
         return solution(c * np.column_stack([REST[:, 2] ** 2, *np.zeros((2, len(REST)))]))
 
     knife = HalfSpace((0.0, 0.0, 0.0), (1.0, 0.0, 0.0))
-    found = pulled_back(bent(0.06), 1, "knife", knife, most=0.1)
-    assert 0.06 / 8 <= found.plane_deviation < 0.06 / 4
-    assert found.cut.plane.normal == pytest.approx((1, 0, 0), abs=5e-3)
+    pullback = pulled_back(bent(0.06), 1, "knife", knife, most=0.1)
+    assert 0.06 / 8 <= pullback.plane_deviation < 0.06 / 4
+    assert pullback.cut.plane.normal == pytest.approx((1, 0, 0), abs=5e-3)
     assert pulled_back(bent(0.06), 1, "knife", knife).plane_deviation < MOST * 3**0.5
     with pytest.raises(StudyError, match=r"its plane is curved by 22\S* mm, 1\.3 % of the size"):
         pulled_back(bent(0.12), 1, "knife", knife)
@@ -75,7 +75,7 @@ def test_a_front_that_bends_is_measured_and_refused():
 
 
 @pytest.mark.parametrize(
-    ("changes", "said"),
+    ("changes", "message"),
     [
         ({"plane": HalfSpace((2.0, 0.0, 0.0), (1.0, 0.0, 0.0))}, "misses the body"),
         ({"within": HalfSpace((-3.0, 0.0, 0.0), (1.0, 0.0, 0.0))}, "misses the body"),
@@ -84,9 +84,9 @@ def test_a_front_that_bends_is_measured_and_refused():
         ({"solution": solution(0 * REST, BALL_SQUEEZE)}, "solved on an octant"),
     ],
 )
-def test_refusals(changes, said):
+def test_refusals(changes, message):
     given = {"solution": uniform(), "checkpoint": 1, "name": "knife", "plane": KNIFE, "within": BLADE} | changes
-    with pytest.raises(StudyError, match=said):
+    with pytest.raises(StudyError, match=message):
         pulled_back(**given)
 
 
@@ -95,7 +95,7 @@ def test_the_middle_of_a_pulled_ball_was_its_middle(tmp_path):
     reference = reference_for(tmp_path, BALL_INCISED)
     pull = float(BALL_INCISED.held[1].path(BALL_INCISED.checkpoints[0])[2])
     assert pull > 0.002
-    found = pulled_back(reference, 0, "knife", HalfSpace((0.0, 0.0, pull / 2), (0.0, 0.0, 1.0)))
-    assert found.cut.plane.level(np.zeros((1, 3)))[0] == pytest.approx(0.0, abs=0.02 * pull)
-    assert found.cut.plane.normal == pytest.approx((0, 0, 1), abs=2e-3)
-    assert replace(found.cut, contact=True).plane == found.cut.plane
+    pullback = pulled_back(reference, 0, "knife", HalfSpace((0.0, 0.0, pull / 2), (0.0, 0.0, 1.0)))
+    assert pullback.cut.plane.level(np.zeros((1, 3)))[0] == pytest.approx(0.0, abs=0.02 * pull)
+    assert pullback.cut.plane.normal == pytest.approx((0, 0, 1), abs=2e-3)
+    assert replace(pullback.cut, contact=True).plane == pullback.cut.plane

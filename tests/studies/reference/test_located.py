@@ -1,4 +1,4 @@
-"""Points are found once in a mesh, whichever solution on it and whichever checkpoint is asked."""
+"""Points are found once in a mesh, whichever solution and whichever checkpoint."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -90,7 +90,7 @@ def test_the_search_that_leaves_elements_out_finds_what_the_search_of_all_finds(
 def test_an_inverse_map_that_did_not_converge_is_not_believed(bulged, monkeypatch):
     """One that always ends beyond the face across from the first corner: a place is then the nearest middle of one."""
     solution, points = bulged
-    points = points[:50]  # others than those that are known
+    points = points[:50]  # not those that are stored
     monkeypatch.setattr(Evaluator, "invert", lambda self, element, _: np.ones((len(element), 3)))
     monkeypatch.setattr(solution._evaluators[0], "max_outside", np.inf)
     element, local = solution._evaluators[0].locate(points)
@@ -101,7 +101,7 @@ def test_an_inverse_map_that_did_not_converge_is_not_believed(bulged, monkeypatc
 
 
 @pytest.mark.parametrize("lean", [0.0, 1.0, -3.0])
-def test_a_place_on_a_cut_is_found_on_either_side_also_where_the_surface_leans_over_its_mouth(lean):
+def test_a_place_on_a_cut_is_located_on_either_side_also_where_the_surface_leans_over_its_mouth(lean):
     """A cube that leans along x is cut in two, and its upper half moves up by 10 mm: so wide is the cut everywhere."""
     points, _, cells = cube(3)
     points = (points + np.array([0.0, 0.0, 0.1 / 6])) * [1.0, 1.3, 1.0]

@@ -124,9 +124,9 @@ def test_solutions_are_compared_at_the_vertices_of_the_coarsest_mesh(family, bal
 
 def test_bars_are_of_all_that_the_scene_compares(ball):
     assert {"force", "force_end", "surface", "interior", "surface_mean", "silhouette"} < set(ball.uncertainty)
-    for name, known in ball.uncertainty.items():
-        assert set(known.shares) == {"mesh", "steps", "kappa"} and known.shift == 0.0
-        assert known.shares["steps"] < 1e-3 * (1 if name != "pressure" else 10), name
+    for name, bar in ball.uncertainty.items():
+        assert set(bar.shares) == {"mesh", "steps", "kappa"} and bar.shift == 0.0
+        assert bar.shares["steps"] < 1e-3 * (1 if name != "pressure" else 10), name
     assert 0 < ball.uncertainty["volume"].shares["kappa"] < 1e-2
 
 
@@ -138,9 +138,9 @@ def test_refinement_ends_when_the_bars_are_within_the_tolerance(mesh_cache):
 
 @pytest.mark.parametrize(("first", "most", "count"), [(1000, 2500, 1), (1000, 2501, 2), (6216, 60e3, 3), (100, 1e5, 8)])
 def test_targets_are_even_steps_that_end_at_most(first, most, count):
-    found = targets(first, most)
-    assert len(found) == count and found[-1] == pytest.approx(most, rel=1e-12)
-    ratios = np.array(found) / [first, *found[:-1]]
+    sizes = targets(first, most)
+    assert len(sizes) == count and sizes[-1] == pytest.approx(most, rel=1e-12)
+    ratios = np.array(sizes) / [first, *sizes[:-1]]
     np.testing.assert_allclose(ratios, ratios[0], rtol=1e-12)
     assert 1 < ratios[0] <= GROWTH * (1 + 1e-9)
 
@@ -163,7 +163,7 @@ def failing_from(monkeypatch, name, number, error):
     monkeypatch.setattr(nested, name, call)
 
 
-def test_where_no_equilibrium_is_found_refinement_stops_and_says_so(mesh_cache, tmp_path, monkeypatch):
+def test_without_an_equilibrium_refinement_stops_and_names_the_reason(mesh_cache, tmp_path, monkeypatch):
     """The finest mesh that was solved is the reference, with the bar of those that there are."""
     failing_from(monkeypatch, "refined", 1, SolveError("25 iterations left too much"))
     record = read_record(solve(tmp_path, ReferenceSolve(SMALL)))
@@ -179,9 +179,9 @@ def test_where_no_equilibrium_is_found_refinement_stops_and_says_so(mesh_cache, 
 def test_a_mesh_whose_carried_states_lead_nowhere_is_solved_from_rest(mesh_cache, monkeypatch, number):
     """All of its checkpoints, whether the last one fails or another."""
     failing_from(monkeypatch, "continued", number, StepFailed("made to fail"))
-    found = solve_nested(SMALL, VARIANTS)
-    assert (found.failure, found.stopped, len(found.samples)) == ("", "", 3)
-    check_path(SMALL, found, 1e-4)
+    solution = solve_nested(SMALL, VARIANTS)
+    assert (solution.failure, solution.stopped, len(solution.samples)) == ("", "", 3)
+    check_path(SMALL, solution, 1e-4)
 
 
 def test_a_base_that_breaks_off_is_stored_and_not_believed(mesh_cache, tmp_path, monkeypatch):
@@ -211,10 +211,10 @@ def ball_under(friction):
     ("friction", "within", "settings"),
     [(0, 2e-3, NewtonSettings(penetration_tol=1e-5)), ("no_slip", 5e-3, NewtonSettings())],
 )
-def test_contact_is_found_on_every_mesh(mesh_cache, friction, within, settings):
+def test_contact_is_solved_on_every_mesh(mesh_cache, friction, within, settings):
     """Within how far points may sink in, and slip from step to step; without slip by a path from rest on each mesh, as
     what an obstacle holds depends on its way."""
     scene = ball_under(friction)
-    found = solve_nested(scene, VARIANTS)
-    assert (found.stopped, found.failure, len(found.samples)) == ("", "", 3)
-    check_path(scene, found, within, settings)
+    solution = solve_nested(scene, VARIANTS)
+    assert (solution.stopped, solution.failure, len(solution.samples)) == ("", "", 3)
+    check_path(scene, solution, within, settings)

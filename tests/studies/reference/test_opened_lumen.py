@@ -101,8 +101,8 @@ def test_after_the_cut_it_is_the_opened_mesh_alone(mesh, path):
 
 def near(x: np.ndarray, patch: np.ndarray, mesh) -> np.ndarray:
     """Which places (3, n) are nodes of a patch."""
-    known = nodes(mesh)[patch]
-    return (np.abs(x.T[:, None] - known[None]).max(axis=2) < 1e-9 * RADIUS).any(axis=1)
+    places = nodes(mesh)[patch]
+    return (np.abs(x.T[:, None] - places[None]).max(axis=2) < 1e-9 * RADIUS).any(axis=1)
 
 
 def test_it_ends_as_one_that_was_never_filled(mesh, path):

@@ -82,7 +82,7 @@ def test_a_file_that_is_none_costs_its_own_rows(tmp_path, capsys):
 @pytest.mark.parametrize(("name", "load", "force"), WITHIN)
 def test_references_of_real_organs_can_judge(name, load, force, tmp_path, mesh_cache):
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # thin margins are told of
+        warnings.simplefilter("ignore")  # thin margins warn
         scene = scan_scenes(real_surface(name))[load]
         reference = reference_of(tmp_path, scene)
     bars = reference.total_uncertainty

@@ -26,27 +26,27 @@ EQUATOR = (1.01325, 1.08359)
 ORACLE = 1e-4
 
 
-def test_force_and_equator(found):
+def test_force_and_equator(reference):
     # Some fifty curved quadratic tetrahedra: the force is then 1 % off, a plane too many or an octant too few 50 %.
-    np.testing.assert_allclose(found.force / (SHEAR * RADIUS**2), FORCE, rtol=0.05)
+    np.testing.assert_allclose(reference.force / (SHEAR * RADIUS**2), FORCE, rtol=0.05)
     for checkpoint, radius in enumerate(EQUATOR):
-        points, triangles = found.surface(checkpoint)
+        points, triangles = reference.surface(checkpoint)
         used = points[np.unique(triangles)]
         assert np.linalg.norm(used[:, :2], axis=1).max() == pytest.approx(radius * RADIUS, rel=0.005)
         assert np.ptp(used[:, 2]) == pytest.approx(2 * RADIUS * (1 - DEPTH[checkpoint]), rel=2e-3)
 
 
-def test_pressure_is_the_one_that_balances_the_planes(found):
+def test_pressure_is_the_one_that_balances_the_planes(reference):
     """Σ f·x = ∫ tr σ dv, and tr σ/3 is the pressure: two planes F at ± h press 2 F h/(3 V) into the ball on average."""
     height = RADIUS * (1 - np.array(DEPTH))
-    volume = found.field("volume") * 4 / 3 * np.pi * RADIUS**3
+    volume = reference.field("volume") * 4 / 3 * np.pi * RADIUS**3
     # 0.2 % is what this mesh leaves; a mean over nodes, most of which are near the pole, is three times too large.
-    np.testing.assert_allclose(found.field("pressure"), 2 * found.force * height / (3 * volume), rtol=0.01)
+    np.testing.assert_allclose(reference.field("pressure"), 2 * reference.force * height / (3 * volume), rtol=0.01)
 
 
-def test_every_quantity_has_a_positive_floor_in_shares(found):
+def test_every_quantity_has_a_positive_floor_in_shares(reference):
     # A ball has no lumen and no cut, does not ring, and this one may turn; what is not compared is not listed.
-    assert set(found.total_uncertainty) == set(QUANTITIES) - {
+    assert set(reference.total_uncertainty) == set(QUANTITIES) - {
         "lumen",
         "opening",
         "frequency",
@@ -54,25 +54,25 @@ def test_every_quantity_has_a_positive_floor_in_shares(found):
         "surface_mean",
         "interior",
     }
-    for name, known in found.uncertainty.items():
-        assert set(known.shares) == {"mesh", "steps", "contact", "kappa"}
-        assert found.total_uncertainty[name] == pytest.approx(
-            np.sqrt(sum(share**2 for share in known.shares.values())), rel=1e-12
+    for name, bar in reference.uncertainty.items():
+        assert set(bar.shares) == {"mesh", "steps", "contact", "kappa"}
+        assert reference.total_uncertainty[name] == pytest.approx(
+            np.sqrt(sum(share**2 for share in bar.shares.values())), rel=1e-12
         )
         # Coarse, but neighbours: more than a fifth apart they would not describe the same thing.
-        assert 0 < known.shares["mesh"] < 0.3, name
+        assert 0 < bar.shares["mesh"] < 0.3, name
         # A path without friction or loss forgets its steps, but for how far points sink in: a thousandth is allowed.
-        assert known.shares["steps"] < 3e-3, name
-        assert known.shares["contact"] > 0
-        assert known.shares["kappa"] > 0
+        assert bar.shares["steps"] < 3e-3, name
+        assert bar.shares["contact"] > 0
+        assert bar.shares["kappa"] > 0
     # kappa = 5000 mu lets the volume change by p/kappa, here under 2e-4; contact and mesh hardly do.
-    volume = found.uncertainty["volume"]
-    assert volume.shares["kappa"] == pytest.approx(np.abs(found.field("volume") - 1).max(), rel=0.05)
+    volume = reference.uncertainty["volume"]
+    assert volume.shares["kappa"] == pytest.approx(np.abs(reference.field("volume") - 1).max(), rel=0.05)
 
 
-def test_the_table_of_references_tells_how_far_the_finest_mesh_is_from_the_true_shape(found):
+def test_the_table_of_references_tells_how_far_the_finest_mesh_is_from_the_true_shape(reference):
     """Of an octant as a whole ball: some fifty curved elements."""
-    table = uncertainty_table({"ball": found})
+    table = uncertainty_table({"ball": reference})
     (distance,), (volume,) = table["shape_error [%]"].unique(), table["shape_volume [%]"].unique()
     assert 0 < distance < 0.5 and -0.3 < volume < 0
 
@@ -92,40 +92,41 @@ def test_the_error_bar_covers_the_true_error_and_is_not_idle(tmp_path, levels):
         assert true < reference.total_uncertainty[name] + ORACLE < 20 * (true + ORACLE), name
 
 
-def test_a_shift_is_told_and_not_applied(found):
+def test_a_shift_is_reported_and_not_applied(reference):
     """The force that is compared with is that of the finest mesh."""
-    known = found.uncertainty["force_end"]
-    assert found.force[-1] == found.scene.output_force(found.field("contact_force"), found.field("held_force"))[-1]
-    assert abs(known.shift) <= known.shares["mesh"]
+    bar = reference.uncertainty["force_end"]
+    contact, held = reference.field("contact_force"), reference.field("held_force")
+    assert reference.force[-1] == reference.scene.output_force(contact, held)[-1]
+    assert abs(bar.shift) <= bar.shares["mesh"]
 
 
-def test_two_meshes_have_a_larger_bar_and_one_has_none(found):
-    pair = uncertainties(SCENE, found.at, found.meshes[:2], found.variants)
+def test_two_meshes_have_a_larger_bar_and_one_has_none(reference):
+    pair = uncertainties(SCENE, reference.at, reference.meshes[:2], reference.variants)
     assert pair["force"].total > 0
-    assert pair["silhouette"].shares["mesh"] > found.uncertainty["silhouette"].shares["mesh"]
+    assert pair["silhouette"].shares["mesh"] > reference.uncertainty["silhouette"].shares["mesh"]
     with pytest.raises(StudyError, match="one mesh only"):
-        uncertainties(SCENE, found.at, found.meshes[:1], {})
+        uncertainties(SCENE, reference.at, reference.meshes[:1], {})
 
 
-def test_displacement_is_mirrored(found):
+def test_displacement_is_mirrored(reference):
     points = RADIUS * np.random.default_rng(3).uniform(0.05, 0.55, (40, 3))
-    truth = found.displacement(points)
+    truth = reference.displacement(points)
     assert np.abs(truth).max() > 0.05 * RADIUS
     for sign in ([-1, 1, 1], [1, 1, -1], [-1, -1, -1]):
-        np.testing.assert_array_equal(found.displacement(points * sign), truth * sign)
-    axis = found.displacement(np.array([[0.0, 0.0, 0.5 * RADIUS]]))
+        np.testing.assert_array_equal(reference.displacement(points * sign), truth * sign)
+    axis = reference.displacement(np.array([[0.0, 0.0, 0.5 * RADIUS]]))
     assert np.abs(axis[0, :2]).max() < 1e-9
     assert axis[0, 2] < 0
 
 
-def test_displacement_at_a_node_is_the_stored_one(found):
-    nodes, stored = found.field("nodes")[:50], found.field("displacement")[:, :50]
-    np.testing.assert_allclose(found.displacement(nodes), stored[-1], rtol=0, atol=1e-9 * RADIUS)
-    np.testing.assert_allclose(found.displacements(nodes), stored, rtol=0, atol=1e-9 * RADIUS)
+def test_displacement_at_a_node_is_the_stored_one(reference):
+    nodes, stored = reference.field("nodes")[:50], reference.field("displacement")[:, :50]
+    np.testing.assert_allclose(reference.displacement(nodes), stored[-1], rtol=0, atol=1e-9 * RADIUS)
+    np.testing.assert_allclose(reference.displacements(nodes), stored, rtol=0, atol=1e-9 * RADIUS)
 
 
-def test_surface_is_whole_and_outward(found):
-    points, triangles = found.surface()
+def test_surface_is_whole_and_outward(reference):
+    points, triangles = reference.surface()
     used, inverse = np.unique(np.round(points / (1e-6 * RADIUS)), axis=0, return_inverse=True)
     welded = inverse.reshape(-1)[triangles]
     edges, count = np.unique(
@@ -140,7 +141,7 @@ def test_surface_is_whole_and_outward(found):
     assert hausdorff(points, triangles, *mirrored) < 1e-9 * RADIUS
 
 
-def test_whole_forces_mirror_and_multiply(found):
+def test_whole_forces_mirror_and_multiply(reference):
     octant = np.array([[[0.1, -0.2, -3.0]], [[0.0, 0.0, -5.0]]])
     whole = whole_forces(SCENE, octant)
     np.testing.assert_array_equal(whole[:, 0], [[0, 0, -12], [0, 0, -20]])
@@ -149,7 +150,7 @@ def test_whole_forces_mirror_and_multiply(found):
     np.testing.assert_array_equal(whole_forces(solid, octant), octant)
 
 
-def test_both_planes_are_felt(found):
-    contact = found.field("contact_force")
+def test_both_planes_are_felt(reference):
+    contact = reference.field("contact_force")
     np.testing.assert_array_equal(contact[:, 0], -contact[:, 1])
-    np.testing.assert_array_equal(found.force, -contact[:, 0, 2])
+    np.testing.assert_array_equal(reference.force, -contact[:, 0, 2])

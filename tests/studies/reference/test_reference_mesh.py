@@ -104,17 +104,17 @@ def drawn(mesh, outline):
 
 
 def test_drawn_elements_hold_the_root_of_the_distance_better():
-    """√r, interpolated at the nodes, at the quadrature points of the elements beside the outline r = 0."""
+    """√r, interpolated at the nodes, at the quadrature points of the elements that touch the outline r = 0."""
     mesh, outline = edge_of_a_cube()
     closer = drawn(mesh, outline)
-    beside = np.isin(mesh.t, outline).any(axis=0)
+    touching = np.isin(mesh.t, outline).any(axis=0)
     shape, _ = basis_table(ElementTetP2(), get_quadrature(RefTet, 6)[0])
 
     def left(mesh):
-        x = nodes(mesh)[element_nodes(mesh)[beside]]
+        x = nodes(mesh)[element_nodes(mesh)[touching]]
         at = np.einsum("eni,qn->eqi", x, shape)
-        wanted, held = (np.sqrt(np.hypot(y[..., 0], y[..., 1])) for y in (at, x))
-        return np.sqrt(((held @ shape.T - wanted) ** 2).mean())
+        exact, nodal = (np.sqrt(np.hypot(y[..., 0], y[..., 1])) for y in (at, x))
+        return np.sqrt(((nodal @ shape.T - exact) ** 2).mean())
 
     assert left(closer) < 0.8 * left(mesh)
 

@@ -71,17 +71,17 @@ def test_settings_are_varied_only_where_they_matter():
     assert reference_solves(replace(SCENE, reference=None)) == []
 
 
-def test_a_reference_holds_its_meshes_and_the_settings_made_better(found):
+def test_a_reference_holds_its_meshes_and_the_settings_made_better(reference):
     """Fine to coarse; all of them at both checkpoints, compared at the vertices of the coarsest."""
-    assert [len(found.meshes), list(found.variants)] == [3, ["steps", "contact", "kappa"]]
-    unknowns, sizes = ([getattr(one, name) for one in found.meshes] for name in ("unknowns", "size"))
+    assert [len(reference.meshes), list(reference.variants)] == [3, ["steps", "contact", "kappa"]]
+    unknowns, sizes = ([getattr(one, name) for one in reference.meshes] for name in ("unknowns", "size"))
     assert sorted(unknowns, reverse=True) == unknowns and sorted(sizes) == sizes
-    assert unknowns[0] == found.record.attributes["unknowns"]
-    assert {one.unknowns for one in found.variants.values()} == {unknowns[-1]}
-    for one in (*found.meshes, *found.variants.values()):
-        assert one.u.shape == found.at.points.shape and np.isfinite(one.force).all()
-    np.testing.assert_array_equal(found.meshes[0].force, found.force)
-    assert found.at.symmetric and len(found.at.points) < len(found.field("nodes"))
+    assert unknowns[0] == reference.record.attributes["unknowns"]
+    assert {one.unknowns for one in reference.variants.values()} == {unknowns[-1]}
+    for one in (*reference.meshes, *reference.variants.values()):
+        assert one.u.shape == reference.at.points.shape and np.isfinite(one.force).all()
+    np.testing.assert_array_equal(reference.meshes[0].force, reference.force)
+    assert reference.at.symmetric and len(reference.at.points) < len(reference.field("nodes"))
 
 
 def standing(root):
@@ -101,16 +101,16 @@ def test_listing_says_how_a_reference_stands(solved, tmp_path, monkeypatch):
     assert standing(solved).status == "stale"
 
 
-def test_error_bars_are_written_once_and_again_when_a_reference_changes(solved, tmp_path, found):
+def test_error_bars_are_written_once_and_again_when_a_reference_changes(solved, tmp_path, reference):
     root = shutil.copytree(solved, tmp_path / "results")
     table, chart = refresh_uncertainty(
         References(Ledger(root)), [SCENE, SCENE, replace(SCENE, name="bare", reference=None)]
     )
     rows = pd.read_csv(table)
-    assert rows["quantity"].tolist() == list(found.total_uncertainty)
+    assert rows["quantity"].tolist() == list(reference.total_uncertainty)
     shares = rows[["mesh [%]", "steps [%]", "contact [%]", "kappa [%]"]].to_numpy()
     np.testing.assert_allclose(np.linalg.norm(shares, axis=1), rows["uncertainty [%]"], rtol=1e-5)
-    assert rows["uncertainty [%]"][0] == pytest.approx(100 * found.total_uncertainty["force"], rel=1e-5)
+    assert rows["uncertainty [%]"][0] == pytest.approx(100 * reference.total_uncertainty["force"], rel=1e-5)
     assert set(rows["meshes"]) == {3}
     assert chart.read_bytes()[:4] == b"\x89PNG"
     chart.write_bytes(b"old")

@@ -40,14 +40,14 @@ def family(rate=2 / 3, slope=0.5):
 
 
 def test_samples_come_back_from_a_record_bit_for_bit():
-    known = [*family(), sample(0.1, "steps"), sample(0.2, "kappa", force=np.full(END + 1, np.nan), frequency=3.25)]
-    fields = new_fields(REFERENCE_FIELDS, empty_fields() | sample_fields(AT, known, len(BALL_CLAMPED.checkpoints)))
-    at, found = samples_in(BALL_CLAMPED, SimpleNamespace(fields=fields))
+    samples = [*family(), sample(0.1, "steps"), sample(0.2, "kappa", force=np.full(END + 1, np.nan), frequency=3.25)]
+    fields = new_fields(REFERENCE_FIELDS, empty_fields() | sample_fields(AT, samples, len(BALL_CLAMPED.checkpoints)))
+    at, copies = samples_in(BALL_CLAMPED, SimpleNamespace(fields=fields))
     np.testing.assert_array_equal(at.points, POINTS)
     np.testing.assert_array_equal(at.tetrahedra, CELLS)
     assert not at.symmetric and samples_in(BALL_SQUEEZE, SimpleNamespace(fields=fields))[0].symmetric
-    assert [one.variant for one in found] == ["", "", "", "steps", "kappa"]
-    for one, other in zip(known, found, strict=True):
+    assert [one.variant for one in copies] == ["", "", "", "steps", "kappa"]
+    for one, other in zip(samples, copies, strict=True):
         assert (one.unknowns, one.size) == (other.unknowns, other.size)
         np.testing.assert_array_equal([one.frequency], [other.frequency])
         for name in ("u", *SERIES):
@@ -87,9 +87,9 @@ def test_a_bar_of_nested_meshes_is_the_safety_times_their_error(name):
     error = 1e-4 * 40 ** (-2 / 3)
     scale = {"surface_mean": np.linalg.norm(POINTS * [0.1, -0.1, 0.2], axis=1)}.get(name)
     size = 1.0 if scale is None else AT.areas @ scale / AT.areas.sum() / scale.max()
-    found = uncertainty_of_meshes(BALL_CLAMPED, AT, meshes, name)
-    assert found.uncertainty == pytest.approx(1.25 * error * size, rel=1e-3)
-    assert (found.shift, found.monotone) == (0.0, False)
+    bar = uncertainty_of_meshes(BALL_CLAMPED, AT, meshes, name)
+    assert bar.uncertainty == pytest.approx(1.25 * error * size, rel=1e-3)
+    assert (bar.shift, bar.monotone) == (0.0, False)
 
 
 def test_more_than_three_meshes_have_the_bar_of_the_finest_three():
@@ -104,18 +104,18 @@ def uncertainties_of(meshes):
 
 
 def bars_of(meshes):
-    return {name: known.total for name, known in uncertainties_of(meshes).items()}
+    return {name: bar.total for name, bar in uncertainties_of(meshes).items()}
 
 
 def test_settings_are_compared_with_the_coarsest_mesh_and_add_to_the_bar():
     meshes = family()
     off = meshes[-1].force * 1.01
     better = {"steps": replace(meshes[-1], variant="steps", force=off), "kappa": replace(meshes[-1], variant="kappa")}
-    found = uncertainties(BALL_CLAMPED, AT, meshes, better)["force_end"]
-    assert found.shares["kappa"] == 0.0 and set(found.shares) == {"mesh", "steps", "kappa"}
+    bar = uncertainties(BALL_CLAMPED, AT, meshes, better)["force_end"]
+    assert bar.shares["kappa"] == 0.0 and set(bar.shares) == {"mesh", "steps", "kappa"}
     change = 1 - 1 / 1.01
-    assert found.shares["steps"] == pytest.approx(change / (1 - 1 / FACTORS["steps"]), rel=1e-9)
-    assert found.total == pytest.approx(np.hypot(found.shares["mesh"], found.shares["steps"]), rel=1e-12)
+    assert bar.shares["steps"] == pytest.approx(change / (1 - 1 / FACTORS["steps"]), rel=1e-9)
+    assert bar.total == pytest.approx(np.hypot(bar.shares["mesh"], bar.shares["steps"]), rel=1e-12)
 
 
 def test_every_quantity_that_is_compared_has_a_bar():
@@ -131,8 +131,8 @@ def test_checkpoints_that_a_mesh_was_not_solved_at_are_left_out():
     for k in (1, 2):
         alone = np.where(np.arange(END + 1) == END, meshes[k].force, np.nan)
         meshes[k] = replace(meshes[k], force=alone)
-    found = uncertainties_of(meshes)
-    assert found["force"].total == pytest.approx(found["force_end"].total, rel=1e-6)
+    bars = uncertainties_of(meshes)
+    assert bars["force"].total == pytest.approx(bars["force_end"].total, rel=1e-6)
 
 
 def test_meshes_are_fine_enough_when_force_and_displacement_are():

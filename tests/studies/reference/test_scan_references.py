@@ -100,9 +100,9 @@ def test_the_size_is_that_of_the_mesh_that_is_curved(scene):
 @pytest.mark.slow
 def test_a_ball_in_a_file_has_the_reference_of_the_ball(scene, tmp_path):
     """Straight sides, which hold it up to a polygon of another volume, are 4 % off."""
-    known = replace(scene, organ=BALL_CLAMPED.organ, name="ball_by_name")
+    built_in = replace(scene, organ=BALL_CLAMPED.organ, name="ball_by_name")
     forces = []
-    for one in (scene, known):
+    for one in (scene, built_in):
         record = read_record(solve(tmp_path, ReferenceSolve(one)))
         forces.append(Solution(one, record).force[-1])
     assert forces[0] == pytest.approx(forces[1], rel=0.02)

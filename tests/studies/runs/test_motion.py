@@ -35,7 +35,7 @@ TRUE = LAMB * np.sqrt(SCENE.tissue.shear_modulus / SCENE.tissue.density) / RADIU
 
 
 @pytest.fixture(scope="module")
-def found(mesh_cache, tmp_path_factory):
+def reference(mesh_cache, tmp_path_factory):
     root = tmp_path_factory.mktemp("motion")
     solve(root, ReferenceSolve(SCENE))
     return load_reference(root, SCENE)
@@ -54,40 +54,40 @@ def test_a_frequency_needs_more_than_a_few_values():
         fitted_frequency(np.linspace(0.0, 1.0, 11), np.zeros(11), 0.0)
 
 
-def test_the_reference_rings_like_the_continuum(found):
+def test_the_reference_rings_like_the_continuum(reference):
     """Lamb's is for small swings: one of 5 % and the linear field it starts with are 0.7 % slower on fine meshes."""
-    frequency = found.meshes[0].frequency
+    frequency = reference.meshes[0].frequency
     assert frequency == pytest.approx(TRUE, rel=0.012)
     assert frequency < TRUE
 
 
-def test_the_frequency_has_an_error_bar_of_meshes_and_time_steps(found):
-    bar = found.uncertainty["frequency"]
+def test_the_frequency_has_an_error_bar_of_meshes_and_time_steps(reference):
+    bar = reference.uncertainty["frequency"]
     assert set(bar.shares) == {"mesh", "steps"}
     assert bar.total == combined(bar.shares)
     # second order: a step of (w dt)²/12 = 0.25 % at most is left, and the bar doubles the change
     assert 1e-4 < bar.shares["steps"] < 0.01
-    assert set(found.uncertainty) == {"frequency", "volume"}  # only what the scene lets be compared
+    assert set(reference.uncertainty) == {"frequency", "volume"}  # only what the scene lets be compared
 
 
-def test_the_energy_of_the_motion_is_kept(found):
-    total = found.field("kinetic") + found.field("energy")
+def test_the_energy_of_the_motion_is_kept(reference):
+    total = reference.field("kinetic") + reference.field("energy")
     assert np.all(np.isfinite(total))
     # what the damping took, 1 - e^-ct in the mean, is in the balance too: the rest is the scheme's
-    assert np.abs(found.field("balance")).max() < 0.01 * total[0]
+    assert np.abs(reference.field("balance")).max() < 0.01 * total[0]
     faded = np.exp(-SCENE.damping * SCENE.checkpoints[-1])
     assert total[-1] / total[0] == pytest.approx(faded, abs=0.05)
 
 
-def test_a_mass_spring_ball_is_judged_by_its_frequency(found):
+def test_a_mass_spring_ball_is_judged_by_its_frequency(reference):
     case = Case(SCENE, BodyRecipe("tetrahedral", 150, volumes="nodal"))
     record = measure(case)
     assert record.status == Status.OK
-    error = frequency_error(Run(case, record, found))
+    error = frequency_error(Run(case, record, reference))
     # springs of van Gelder's law with a shear modulus some ten per cent too small: frequency with its root
     assert -15.0 < error < 5.0
     metric = next(m for m in METRICS if m.name == "frequency_error")
-    assert metric.uncertainty(Run(case, record, found)) == 100.0 * found.total_uncertainty["frequency"]
+    assert metric.uncertainty(Run(case, record, reference)) == 100.0 * reference.total_uncertainty["frequency"]
 
 
 def test_both_solvers_start_with_the_same_speed():

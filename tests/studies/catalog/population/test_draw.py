@@ -54,7 +54,7 @@ def _depth(scene):
 
 @pytest.mark.parametrize("name", ["liver", "kidney"])
 def test_the_probe_starts_clear_of_the_mesh_and_ends_inside_it(name):
-    """Judged by the meshed organ, which knows nothing of how the place was found."""
+    """Judged by the meshed organ, independently of the search for the place."""
     for scene in (member(name, 0, number) for number in (0, 1)):
         mesh = organ(name, 360, scene.regions, False, scene.organ.parameters)
         probe, points = scene.obstacles[0], mesh.points[: mesh.outer_count]
@@ -108,7 +108,7 @@ def test_a_probe_is_pushed_along_a_unit_vector(name):
     assert all(abs(value) < 1 for row in shown for value in row)
 
 
-def test_organs_take_turns_so_that_a_study_cut_short_knows_them_all():
+def test_organs_take_turns_so_that_a_study_cut_short_has_them_all():
     study = population_study((Population("liver", 3), Population("kidney", 1)), "turns")
     assert [scene.name for scene in study.scenes] == ["liver_0_000", "kidney_0_000", "liver_0_001", "liver_0_002"]
     assert len(study.cases) == 4 * 7 and len({case.name for case in study.cases}) == 28
@@ -116,7 +116,7 @@ def test_organs_take_turns_so_that_a_study_cut_short_knows_them_all():
 
 
 @pytest.mark.parametrize(
-    ("given", "said"),
+    ("given", "message"),
     [
         (("lever", 3), "liver"),
         (("liver", 0), "count is 0"),
@@ -125,8 +125,8 @@ def test_organs_take_turns_so_that_a_study_cut_short_knows_them_all():
         (("liver", 2.5), "count is 2.5"),
     ],
 )
-def test_a_population_that_is_none_is_refused(given, said):
-    with pytest.raises(StudyError, match=said):
+def test_a_population_that_is_none_is_refused(given, message):
+    with pytest.raises(StudyError, match=message):
         Population(*given)
 
 

@@ -15,7 +15,7 @@ from studies.runs.case import BodyRecipe, Case
 from studies.scene.library import KIDNEY_PROBE, STOMACH_PROBE
 from studies.sweep.find_study import find_study
 
-ONE = Study("asked", "?", (Case(KIDNEY_PROBE, BodyRecipe(nodes=150), ImplicitVolume()),), (), ("force_end",))
+ONE = Study("base", "?", (Case(KIDNEY_PROBE, BodyRecipe(nodes=150), ImplicitVolume()),), (), ("force_end",))
 
 
 @pytest.fixture(scope="module")
@@ -55,15 +55,15 @@ def test_a_placed_organ_is_held_at_one_end_and_touched_far_from_it(placed):
 def test_the_study_asks_its_solid_recipes_of_every_organ(folder):
     study, placed = study_on(ONE, folder, "mm")
     assert [case.scene.name for case in study.cases] == ["whole"] and len(placed) == 3
-    assert study.cases[0].body == ONE.cases[0].body and study.name.startswith("asked-")
+    assert study.cases[0].body == ONE.cases[0].body and study.name.startswith("base-")
 
 
 def test_it_has_a_name_that_every_command_understands(folder):
-    with warnings.catch_warnings(record=True) as told:
+    with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         study = find_study(f"population@{folder}:mm")
     assert {case.scene.name for case in study.cases} == {"whole"} and len(study.cases) == 7
-    assert sum("is refused" in str(warning.message) for warning in told) == 2
+    assert sum("is refused" in str(warning.message) for warning in caught) == 2
 
 
 def test_what_is_no_folder_of_organs_is_refused(folder, tmp_path):

@@ -55,14 +55,14 @@ def test_each_end_is_a_row_that_says_so(ended, name):
     assert record.status == status and told in record.message
 
 
-def test_tables_show_them_all(ended, found):
+def test_tables_show_them_all(ended, reference):
     root, _ = ended
-    runs, problems = entries_beside(root, [SCENE], lambda scene: found)
+    runs, problems = entries_beside(root, [SCENE], lambda scene: reference)
     assert not problems and {run.case.method.name for run in runs} == {*ENDS}
     table = study_table(runs, ("force_end", "volume_worst", "real_time")).set_index("method")
     row = table.loc["squeezed"]
     assert row["volume_worst [%]"] == pytest.approx(10.0) and row["real_time [s/s]"] == pytest.approx(0.2)
-    assert row["force_end [%]"] == pytest.approx(100 * (40.0 / found.force[-1] - 1))
+    assert row["force_end [%]"] == pytest.approx(100 * (40.0 / reference.force[-1] - 1))
     assert table.loc["crashed", "status"] == "failed" and np.isnan(table.loc["crashed", "volume_worst [%]"])
 
 
@@ -143,7 +143,7 @@ LIMITS = {
 
 @pytest.mark.slow
 @pytest.mark.parametrize("peer", [peer for peer in (*PEERS, *OURS) if not peer.absent], ids=lambda peer: peer.name)
-def test_each_program_squeezes_the_ball(found, tmp_path, mesh_cache, peer):
+def test_each_program_squeezes_the_ball(reference, tmp_path, mesh_cache, peer):
     """Where its environment is made: what it hands in is a squeezed ball."""
     if peer.packages and not (ENVIRONMENTS / peer.name / "packages.txt").is_file():
         pytest.skip(f"{peer.name} is not installed here: `make study-league`")
@@ -152,7 +152,8 @@ def test_each_program_squeezes_the_ball(found, tmp_path, mesh_cache, peer):
     (record,) = contest(tmp_path / "r", attempts, tmp_path / "g", environments=ENVIRONMENTS)
     assert record.status == Status.OK, record.message
     runs, _ = entries_beside(tmp_path / "r", [scene], lambda scene: None)
-    table = study_table([replace(run, reference=found) for run in runs], ("force_end", "volume_worst", "penetration"))
+    judged = [replace(run, reference=reference) for run in runs]
+    table = study_table(judged, ("force_end", "volume_worst", "penetration"))
     force, volume, depth = LIMITS[peer.name]
     assert (table["force_end [%]"].abs() < force).all() and (table["volume_worst [%]"] < volume).all()
     assert (table["penetration [%]"] < depth).all()

@@ -46,16 +46,16 @@ def never_timed(monkeypatch):
     monkeypatch.setattr(answers, "short_timing", refuse)
 
 
-def body(found):
-    return found.chosen.case.body
+def body(advice):
+    return advice.chosen.case.body
 
 
 def test_the_usual_wish_is_met_by_the_cheapest_that_meets_both_errors(results, never_timed):
-    found = advise("liver_press", results=results)
-    assert body(found) == GRADED and found.meets and found.usual
-    assert (found.wish.force, found.wish.displacement) == (3.0, 1.0)
-    assert found.chosen.force == (-1.2, 0.5) and found.chosen.displacement == (0.8, 0.1)
-    assert found.real_time == pytest.approx(2.0)
+    advice = advise("liver_press", results=results)
+    assert body(advice) == GRADED and advice.meets and advice.usual
+    assert (advice.wish.force, advice.wish.displacement) == (3.0, 1.0)
+    assert advice.chosen.force == (-1.2, 0.5) and advice.chosen.displacement == (0.8, 0.1)
+    assert advice.real_time == pytest.approx(2.0)
     assert recommended(LIVER_PRESS, results) == (GRADED, 0.8)
 
 
@@ -71,8 +71,8 @@ def test_the_usual_wish_is_met_by_the_cheapest_that_meets_both_errors(results, n
     ],
 )
 def test_only_what_is_named_counts(results, never_timed, wish, chosen):
-    found = advise(LIVER_PRESS, **wish, results=results)
-    assert body(found) == chosen and found.meets
+    advice = advise(LIVER_PRESS, **wish, results=results)
+    assert body(advice) == chosen and advice.meets
 
 
 @pytest.mark.parametrize(
@@ -84,13 +84,13 @@ def test_only_what_is_named_counts(results, never_timed, wish, chosen):
     ],
 )
 def test_where_none_meets_the_nearest_is_named(results, never_timed, wish, nearest):
-    found = advise(LIVER_PRESS, **wish, results=results)
-    assert body(found) == nearest and not found.meets and not found.unknowable
+    advice = advise(LIVER_PRESS, **wish, results=results)
+    assert body(advice) == nearest and not advice.meets and not advice.unknowable
 
 
 def test_no_error_is_promised_that_the_reference_does_not_know(results, never_timed):
-    found = advise(LIVER_PRESS, force=0.004, results=results)
-    assert found.unknowable == ("force",) and not found.meets and body(found) == FINE
+    advice = advise(LIVER_PRESS, force=0.004, results=results)
+    assert advice.unknowable == ("force",) and not advice.meets and body(advice) == FINE
 
 
 def test_a_recipe_that_ended_badly_is_none(tmp_path, never_timed):
@@ -103,10 +103,10 @@ def test_hollow_organs_may_be_farther_off(tmp_path, never_timed):
     assert body(advise(STOMACH_PRESS, results=publish(tmp_path, rows_of(STOMACH_PRESS)))) == EVEN
 
 
-def test_what_a_scene_does_not_compare_is_said_and_left_out(tmp_path, never_timed):
+def test_what_a_scene_does_not_compare_is_ignored_by_name(tmp_path, never_timed):
     results = publish(tmp_path, rows_of(SPLEEN_SAG, **{"force_end [%]": NAN, "force_end floor [%]": NAN}))
-    found = advise(SPLEEN_SAG, results=results)
-    assert found.ignored == ("force",) and found.meets and body(found) == GRADED
+    advice = advise(SPLEEN_SAG, results=results)
+    assert advice.ignored == ("force",) and advice.meets and body(advice) == GRADED
     alone = advise(SPLEEN_SAG, force=0.03, results=results)
     assert alone.chosen is None and not alone.meets and alone.ignored == ("force",)
 
@@ -118,11 +118,11 @@ def test_what_was_published_by_the_writer_of_tables_is_read_back(tmp_path, never
     publish(tmp_path, [])
     write_table(tmp_path / "published" / "accuracy" / "accuracy.csv", study_table(runs, ("force_end", "mean_error",
                 "real_time")))  # fmt: skip
-    found = advise(LIVER_PRESS, force=0.025, results=tmp_path)
-    assert found.chosen.case == runs[0].case.replaced(timed=False)
-    assert found.chosen.force == pytest.approx((-2.0, 2.0))
-    assert found.chosen.cost.value == pytest.approx(0.1 * 1.02 / (LIVER_PRESS.duration / 40), rel=1e-5)
-    assert found.chosen.dt == pytest.approx(1e-3)
+    advice = advise(LIVER_PRESS, force=0.025, results=tmp_path)
+    assert advice.chosen.case == runs[0].case.replaced(timed=False)
+    assert advice.chosen.force == pytest.approx((-2.0, 2.0))
+    assert advice.chosen.cost.value == pytest.approx(0.1 * 1.02 / (LIVER_PRESS.duration / 40), rel=1e-5)
+    assert advice.chosen.dt == pytest.approx(1e-3)
 
 
 def stored_runs(monkeypatch, *runs):
@@ -142,10 +142,10 @@ GRADED_RUN = {"nodes": 994, "fraction": 0.8, "frame_ms": 10.0, "recipe": {"grade
 def test_a_run_replaces_its_published_row_and_the_others_stay(results, monkeypatch, never_timed):
     stored = run(LIVER_PRESS, "quadratic", error=0.02, **GRADED_RUN)
     stored_runs(monkeypatch, stored)
-    found = advise(LIVER_PRESS, force=0.025, results=results)
-    assert found.chosen.case == stored.case and found.chosen.force.value == pytest.approx(-2.0)
-    assert found.stored.where == f"{results / 'accuracy'} and {results / 'published' / 'accuracy' / 'accuracy.csv'}"
-    assert found.chosen.cost.uncertainty > 0  # repeats are stored, not only their median
+    advice = advise(LIVER_PRESS, force=0.025, results=results)
+    assert advice.chosen.case == stored.case and advice.chosen.force.value == pytest.approx(-2.0)
+    assert advice.stored.where == f"{results / 'accuracy'} and {results / 'published' / 'accuracy' / 'accuracy.csv'}"
+    assert advice.chosen.cost.uncertainty > 0  # repeats are stored, not only their median
     assert body(advise(LIVER_PRESS, force=0.005, results=results)) == FINE
 
 
@@ -156,8 +156,8 @@ def test_a_run_that_ended_badly_here_is_not_advised_for_its_published_row(result
 
 def test_a_run_without_a_reference_leaves_its_published_row(results, monkeypatch, never_timed):
     stored_runs(monkeypatch, run(LIVER_PRESS, "quadratic", with_reference=False, **GRADED_RUN))
-    found = advise(LIVER_PRESS, results=results)
-    assert body(found) == GRADED and found.chosen.force.value == -1.2
+    advice = advise(LIVER_PRESS, results=results)
+    assert body(advice) == GRADED and advice.chosen.force.value == -1.2
 
 
 def like(scene, **changes):
@@ -167,11 +167,11 @@ def like(scene, **changes):
 def test_a_scene_that_was_never_run_gets_the_worst_of_its_kind(tmp_path, never_timed):
     worse = {b: (2 * f, 0.5 * u, 3 * c) for b, (f, u, c) in LADDER.items() if b != EVEN}
     results = publish(tmp_path, [*rows_of(LIVER_PROBE), *rows_of(KIDNEY_PROBE, worse), *rows_of(LIVER_PRESS)])
-    found = advise(like(LIVER_PROBE), results=results, timing=False)
-    assert found.alike == ("liver_probe", "kidney_probe")
-    assert body(found) == GRADED and found.chosen.case.scene.name == "mine"
-    assert found.chosen.force.value == pytest.approx(-2.4) and found.chosen.displacement.value == 0.8
-    assert found.chosen.cost.value == pytest.approx(1.5) and not found.chosen.timed_here
+    advice = advise(like(LIVER_PROBE), results=results, timing=False)
+    assert advice.alike == ("liver_probe", "kidney_probe")
+    assert body(advice) == GRADED and advice.chosen.case.scene.name == "mine"
+    assert advice.chosen.force.value == pytest.approx(-2.4) and advice.chosen.displacement.value == 0.8
+    assert advice.chosen.cost.value == pytest.approx(1.5) and not advice.chosen.timed_here
     strict = advise(like(LIVER_PROBE), force=0.02, results=results, timing=False)
     assert body(strict) == FINE
 
@@ -187,8 +187,8 @@ def test_a_scene_that_refuses_masses_by_stiffness_is_not_advised_them(tmp_path):
     results = publish(tmp_path, rows_of(LIVER_PRESS, LADDER | {lumped: (-1.3, 0.8, 0.9)}))
     (plane,) = LIVER_PRESS.obstacles
     fast = replace(plane, path=replace(plane.path, times=(0.0, 0.1)))
-    found = advise(replace(LIVER_PRESS, name="fast", obstacles=(fast,)), results=results, timing=False)
-    assert body(found) == lumped
+    advice = advise(replace(LIVER_PRESS, name="fast", obstacles=(fast,)), results=results, timing=False)
+    assert body(advice) == lumped
 
 
 def test_a_kind_that_was_never_measured_is_not_guessed(results):

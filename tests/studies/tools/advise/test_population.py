@@ -36,13 +36,13 @@ def table(path, case=CASE):
 @pytest.mark.parametrize("place", ["population", "published/population"])
 def test_only_members_of_that_organ_with_that_recipe_count(tmp_path, place):
     table(tmp_path / place / "population.csv")
-    found = unseen(tmp_path, CASE)
-    assert found is not None and (found.force.count, found.force.lost, found.organ) == (41, 1, "liver")
-    assert found.force.bound == pytest.approx(np.quantile(np.abs(FORCES), 0.95))
-    assert "41 other organs" in words(found) and "1 more failed" in words(found) and "3.8 %" in words(found)
+    summary = unseen(tmp_path, CASE)
+    assert summary is not None and (summary.force.count, summary.force.lost, summary.organ) == (41, 1, "liver")
+    assert summary.force.bound == pytest.approx(np.quantile(np.abs(FORCES), 0.95))
+    assert "41 other organs" in words(summary) and "1 more failed" in words(summary) and "3.8 %" in words(summary)
 
 
-def test_nothing_is_said_where_nothing_was_run(no_tables, tmp_path):
+def test_without_runs_on_the_population_there_is_no_summary(no_tables, tmp_path):
     assert unseen(tmp_path, CASE) is None
     table(tmp_path / "population" / "population.csv")
     assert unseen(tmp_path, replace(CASE, dt_fraction=0.1)) is None

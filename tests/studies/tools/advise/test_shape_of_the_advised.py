@@ -24,20 +24,20 @@ def answer(tmp_path, rows, scene=LIVER_PRESS, **wish):
 
 
 def test_a_body_in_shape_is_advised_and_its_shape_is_shown(tmp_path):
-    found = answer(tmp_path, shaped(LIVER_PRESS))
-    assert body(found) == GRADED and found.misshapen is None
-    (line,) = [line for line in lines_of(found) if line.startswith("  shape ")]
+    advice = answer(tmp_path, shaped(LIVER_PRESS))
+    assert body(advice) == GRADED and advice.misshapen is None
+    (line,) = [line for line in lines_of(advice) if line.startswith("  shape ")]
     assert line.endswith("0.4 % of the organ's size at most, volume −0.1 %")
 
 
 @pytest.mark.parametrize("shape", [(1.01, 0.0), (0.0, -0.51), (0.0, 0.51)])
 def test_a_body_beyond_a_bound_of_the_shape_is_passed_over(tmp_path, shape):
-    found = answer(tmp_path, shaped(LIVER_PRESS, graded=shape))
-    assert body(found) == FINE and found.meets and found.misshapen.case.body == GRADED
+    advice = answer(tmp_path, shaped(LIVER_PRESS, graded=shape))
+    assert body(advice) == FINE and advice.meets and advice.misshapen.case.body == GRADED
     assert body(answer(tmp_path, shaped(LIVER_PRESS, graded=(1.0, -0.5)))) == GRADED
 
 
-def test_what_it_lacks_is_said(tmp_path):
+def test_the_sentence_names_what_the_body_lacks(tmp_path):
     lines = lines_of(answer(tmp_path, shaped(LIVER_PRESS, graded=(11.3, -4.0))))
     assert (
         "not recommended: adaptive quadratic, masses by stiffness, 994 surface nodes, meets the target, but it is up "
@@ -50,9 +50,9 @@ def test_what_it_lacks_is_said(tmp_path):
 
 def test_where_none_keeps_the_shape_none_is_recommended(tmp_path):
     rows = shaped(LIVER_PRESS, graded=(11.3, -4.0), fine=(2.0, -0.1))
-    found = answer(tmp_path, rows)
-    assert not found.meets and body(found) == EVEN  # 1.4 times the displacement, the fine one twice the shape
-    assert "no body meets it; the closest candidate is (displacement 1.4 times too large):" in lines_of(found)
+    advice = answer(tmp_path, rows)
+    assert not advice.meets and body(advice) == EVEN  # 1.4 times the displacement, the fine one twice the shape
+    assert "no body meets it; the closest candidate is (displacement 1.4 times too large):" in lines_of(advice)
     with pytest.raises(StudyError, match="no body meets the target"):
         recommended(LIVER_PRESS, publish(tmp_path, rows))
     worse = answer(tmp_path, [each for each in rows if each["mean_error [%]"] < 1.0])
@@ -61,14 +61,14 @@ def test_where_none_keeps_the_shape_none_is_recommended(tmp_path):
 
 
 def test_a_table_without_shapes_says_so(tmp_path):
-    found = answer(tmp_path, rows_of(LIVER_PRESS))
-    assert found.meets and found.misshapen is None
-    assert any(line.split() == ["shape", "not", "measured"] for line in lines_of(found))
+    advice = answer(tmp_path, rows_of(LIVER_PRESS))
+    assert advice.meets and advice.misshapen is None
+    assert any(line.split() == ["shape", "not", "measured"] for line in lines_of(advice))
 
 
 def test_a_scene_that_was_never_run_gets_the_worst_shape_of_its_kind(tmp_path):
     rows = [*shaped(LIVER_PROBE), *shaped(KIDNEY_PROBE, graded=(0.9, 0.3)), *rows_of(LIVER_PRESS)]
-    found = answer(tmp_path, rows, like(LIVER_PROBE))
-    assert (found.chosen.shape.value, found.chosen.shape_volume.value) == (0.9, 0.3)
+    advice = answer(tmp_path, rows, like(LIVER_PROBE))
+    assert (advice.chosen.shape.value, advice.chosen.shape_volume.value) == (0.9, 0.3)
     rows = [*shaped(LIVER_PROBE), *shaped(KIDNEY_PROBE, graded=(1.9, 0.3))]
     assert body(answer(tmp_path, rows, like(LIVER_PROBE))) == FINE

@@ -38,45 +38,45 @@ def made(solved, tmp_path_factory):
 def test_the_factor_is_the_one_that_the_first_error_asks_for(made):
     """Forces of a slow press grow in proportion to the springs: F_ref/F = 1/(1 + e/100). Drag does not grow with them,
     up to 2 % of the force."""
-    _, found, _ = made
-    assert [trial.fitted for trial in found.trials] == [(DEEP.name,), (SHALLOW.name,)]
-    for trial in found.trials:
+    _, outcome, _ = made
+    assert [trial.fitted for trial in outcome.trials] == [(DEEP.name,), (SHALLOW.name,)]
+    for trial in outcome.trials:
         own = next(errors for errors in trial.errors if errors.fitted)
         assert own.displacement is None and own.force.before < -20.0
         assert trial.parameters["stiffness"] == pytest.approx(1 / (1 + own.force.before / 100), rel=0.02)
         assert abs(own.force.after) < 1.0
-    assert found.parameters["stiffness"] == found.recipe.stiffness
+    assert outcome.parameters["stiffness"] == outcome.recipe.stiffness
 
 
 @pytest.mark.slow
 def test_the_final_recipe_lies_between_those_of_the_trials(made):
-    _, found, _ = made
-    low, high = sorted(trial.parameters["stiffness"] for trial in found.trials)
-    assert low <= found.recipe.stiffness <= high and found.fitted == (DEEP.name, SHALLOW.name)
+    _, outcome, _ = made
+    low, high = sorted(trial.parameters["stiffness"] for trial in outcome.trials)
+    assert low <= outcome.recipe.stiffness <= high and outcome.fitted == (DEEP.name, SHALLOW.name)
 
 
 @pytest.mark.slow
 def test_judged_errors_are_those_of_the_fitted_body(made):
-    folder, found, _ = made
+    folder, outcome, _ = made
     runs = Measurements(Ledger(folder), (DEEP, SHALLOW))
-    for trial, scene in zip(found.trials, (SHALLOW, DEEP), strict=True):
+    for trial, scene in zip(outcome.trials, (SHALLOW, DEEP), strict=True):
         (judged,) = (errors for errors in trial.errors if not errors.fitted)
         body = replace(BODY, stiffness=trial.parameters["stiffness"])
         assert judged.scene == scene.name and judged.force.after == runs.errors(scene, body).force.value
     assert runs.made == 0
-    assert found.verdict in Verdict and {trial.displacement for trial in found.trials} == {None}
+    assert outcome.verdict in Verdict and {trial.displacement for trial in outcome.trials} == {None}
 
 
 @pytest.mark.slow
 def test_it_is_stored_and_read_back(made):
-    folder, found, _ = made
-    path = calibration_path(folder, found)
+    folder, outcome, _ = made
+    path = calibration_path(folder, outcome)
     assert path == folder / STUDY / f"ball-tetrahedral-{NODES}.json"
-    assert read_calibration(path) == found and calibrated(path) == found.recipe
+    assert read_calibration(path) == outcome and calibrated(path) == outcome.recipe
 
 
 @pytest.mark.slow
-def test_progress_is_told(made):
+def test_progress_counts_every_solve_and_fit(made):
     _, _, progress = made
     assert dict(progress.begun) == {"physics": 3, "fitting": 3}  # a reference and two first runs
     assert len(progress.done) == 6
@@ -85,20 +85,20 @@ def test_progress_is_told(made):
 @pytest.mark.campaign
 def test_an_interrupted_calibration_goes_on(made, tmp_path, monkeypatch):
     """What was run is not run again: after half of it is lost, the other half is made, to the same end."""
-    folder, found, _ = made
+    folder, outcome, _ = made
     again = shutil.copytree(folder, tmp_path / "again")
     records = sorted((again / STUDY).glob("*.h5"))
     for record in records[::2]:
         record.unlink()
-    calibration_path(again, found).unlink()
-    assert calibrate("ball", BODY, again, folds=FOLDS) == found
+    calibration_path(again, outcome).unlink()
+    assert calibrate("ball", BODY, again, folds=FOLDS) == outcome
     assert {path.name for path in (again / STUDY).glob("*.h5")} == {path.name for path in records}
 
     def refuse(*_):
         raise AssertionError("a stored case was run again")
 
     monkeypatch.setattr("studies.sweep.job.CaseJob.run", refuse)
-    assert calibrate("ball", BODY, again, folds=FOLDS) == found
+    assert calibrate("ball", BODY, again, folds=FOLDS) == outcome
 
 
 @pytest.mark.slow
@@ -118,7 +118,7 @@ def test_scenes_are_needed_on_both_sides(tmp_path):
         calibrate("ball", BODY, tmp_path, folds=(Fold((DEEP,), (SHALLOW, replace(DEEP, damping=1.0))),))
 
 
-def test_what_limits_a_trial_is_said(monkeypatch):
+def test_remarks_name_what_limits_a_trial(monkeypatch):
     """A liver judged on a ball: one error is compared, the search is cut at the end of its range, the body breaks."""
     liver = replace(SHALLOW, name="of_a_liver", organ=Organ("liver"))
 
@@ -131,12 +131,12 @@ def test_what_limits_a_trial_is_said(monkeypatch):
 
     monkeypatch.setattr("studies.tools.calibrate.fit.MOST", 3)
     body = BodyRecipe("surface", NODES)
-    found = calibration("liver", body, (Fold((liver,), (DEEP,)),), Runs(), Silent())  # type: ignore[arg-type]
-    (trial,) = found.trials
+    outcome = calibration("liver", body, (Fold((liver,), (DEEP,)),), Runs(), Silent())  # type: ignore[arg-type]
+    (trial,) = outcome.trials
     assert [remark.split()[0] for remark in trial.remarks] == ["judged", "inner", "stiffness", "the", "the"]
     assert trial.remarks[0] == "judged on other organs (ball)"
     assert trial.remarks[-1] == "the fitted body failed in ball_squeeze"
-    assert found.verdict is trial.force is Verdict.MEMORISES and trial.errors[1].force.after is None
+    assert outcome.verdict is trial.force is Verdict.MEMORISES and trial.errors[1].force.after is None
 
 
 def test_a_hollow_organ_starts_with_a_bent_axis():
@@ -149,6 +149,6 @@ def test_a_hollow_organ_starts_with_a_bent_axis():
 
 @pytest.mark.slow
 def test_errors_of_a_run_are_finite_or_not_compared(made):
-    _, found, _ = made
-    values = [errors.force for trial in found.trials for errors in trial.errors]
+    _, outcome, _ = made
+    values = [errors.force for trial in outcome.trials for errors in trial.errors]
     assert np.isfinite([[v.before, v.after, v.uncertainty] for v in values]).all()

@@ -1,4 +1,4 @@
-"""Least squares over few runs finds what is known in closed form."""
+"""Least squares over few runs, held to closed forms."""
 
 import math
 from types import SimpleNamespace
@@ -25,22 +25,22 @@ SURFACE = BodyRecipe("surface", NODES)
 
 
 class Formula:
-    """Errors by formula, and how many different runs they would have been."""
+    """Errors by formula, and the pairs of scene and recipe that they would have run."""
 
     def __init__(self, of):
-        self.of, self.asked = of, set()
+        self.of, self.pairs = of, set()
 
     def __call__(self, scene, recipe):
-        self.asked.add((scene.name, recipe))
+        self.pairs.add((scene.name, recipe))
         return self.of(scene, recipe)
 
 
 @pytest.mark.parametrize("truth", [0.05, 0.7, 1.0, 1.35, 9.0])
 def test_a_force_in_proportion_to_the_stiffness_gives_its_factor(truth):
     errors = Formula(lambda scene, recipe: judged(scene, recipe, 100 * (recipe.stiffness / truth - 1), 4.0))
-    found = fit(SOLID, [BALL_CLAMPED], errors)
-    assert found.recipe.stiffness == pytest.approx(truth, rel=2e-3) and found.converged and not found.at_bound
-    assert len(errors.asked) < 25
+    fitted = fit(SOLID, [BALL_CLAMPED], errors)
+    assert fitted.recipe.stiffness == pytest.approx(truth, rel=2e-3) and fitted.converged and not fitted.at_bound
+    assert len(errors.pairs) < 25
 
 
 def test_two_scenes_meet_at_the_least_squares():
@@ -51,8 +51,8 @@ def test_two_scenes_meet_at_the_least_squares():
     def errors(scene, recipe):
         return judged(scene, recipe, 100 * (recipe.stiffness / truth[scene.name] - 1))
 
-    found = fit(SOLID, [BALL_CLAMPED, BALL_SQUEEZE], errors)
-    assert found.recipe.stiffness == pytest.approx((1 / a + 1 / b) / (1 / a**2 + 1 / b**2), rel=1e-3)
+    fitted = fit(SOLID, [BALL_CLAMPED, BALL_SQUEEZE], errors)
+    assert fitted.recipe.stiffness == pytest.approx((1 / a + 1 / b) / (1 / a**2 + 1 / b**2), rel=1e-3)
 
 
 def bowl(scene, recipe):
@@ -62,28 +62,28 @@ def bowl(scene, recipe):
     return judged(scene, recipe, force, math.hypot(3.0, 5 * inner))
 
 
-def test_of_the_paper_s_body_two_numbers_are_found():
-    found = fit(SURFACE, [BALL_CLAMPED], errors := Formula(bowl))
-    assert found.recipe.stiffness == pytest.approx(2.0, rel=0.01)
-    assert found.recipe.weights == pytest.approx((1.0, 0.5, 0.25, 1.0), rel=0.6 * DIFFERENCE)
-    assert found.parameters == (STIFFNESS, INNER_WEIGHT) and len(errors.asked) < 30
+def test_the_paper_s_body_has_two_numbers_to_fit():
+    fitted = fit(SURFACE, [BALL_CLAMPED], errors := Formula(bowl))
+    assert fitted.recipe.stiffness == pytest.approx(2.0, rel=0.01)
+    assert fitted.recipe.weights == pytest.approx((1.0, 0.5, 0.25, 1.0), rel=0.6 * DIFFERENCE)
+    assert fitted.parameters == (STIFFNESS, INNER_WEIGHT) and len(errors.pairs) < 30
 
 
 def test_no_more_numbers_are_fitted_than_errors_are_compared():
-    found = fit(SURFACE, [BALL_SQUEEZE], lambda scene, recipe: judged(scene, recipe, 50 * recipe.stiffness - 100))
-    assert found.parameters == (STIFFNESS,) and found.recipe.weights is None
-    assert found.recipe.stiffness == pytest.approx(2.0, rel=1e-3)
+    fitted = fit(SURFACE, [BALL_SQUEEZE], lambda scene, recipe: judged(scene, recipe, 50 * recipe.stiffness - 100))
+    assert fitted.parameters == (STIFFNESS,) and fitted.recipe.weights is None
+    assert fitted.recipe.stiffness == pytest.approx(2.0, rel=1e-3)
 
 
-def test_a_goal_is_no_finer_than_the_reference_is_known(monkeypatch):
-    """Displacement wants 1.2, force 1.0: weights of 1 and 1/9, for errors known to 0.5 % count by goals of 1 and 3 %,
-    and of 1/36 and 1/36 where both are known to 6 % alone."""
+def test_a_goal_is_no_finer_than_the_bar_of_the_reference(monkeypatch):
+    """Displacement wants 1.2, force 1.0: weights of 1 and 1/9, where bars of 0.5 % leave the goals of 1 and 3 %,
+    and of 1/36 and 1/36 where both bars are 6 %."""
 
     def errors(scene, recipe):
         return judged(scene, recipe, 100 * (recipe.stiffness - 1), 100 * (recipe.stiffness - 1.2))
 
-    found = fit(SOLID, [BALL_CLAMPED], errors)
-    assert found.recipe.stiffness == pytest.approx((1 / 9 + 1.2) / (1 / 9 + 1), rel=2e-3)
+    fitted = fit(SOLID, [BALL_CLAMPED], errors)
+    assert fitted.recipe.stiffness == pytest.approx((1 / 9 + 1.2) / (1 / 9 + 1), rel=2e-3)
     monkeypatch.setattr(made_up_errors, "UNCERTAINTY", 6.0)
     assert fit(SOLID, [BALL_CLAMPED], errors).recipe.stiffness == pytest.approx(1.1, rel=2e-3)
 
@@ -96,12 +96,12 @@ def test_the_search_turns_back_from_a_body_that_breaks():
 
 
 def test_the_end_of_the_range_is_named():
-    found = fit(SOLID, [BALL_CLAMPED], lambda scene, recipe: judged(scene, recipe, 100 * (recipe.stiffness / 300 - 1)))
-    assert found.at_bound == ("stiffness",) and 90.0 < found.recipe.stiffness <= 100.0
+    fitted = fit(SOLID, [BALL_CLAMPED], lambda scene, recipe: judged(scene, recipe, 100 * (recipe.stiffness / 300 - 1)))
+    assert fitted.at_bound == ("stiffness",) and 90.0 < fitted.recipe.stiffness <= 100.0
 
 
 @pytest.mark.parametrize("body", [SOLID, SURFACE], ids=["tetrahedral", "surface"])
-def test_springs_made_too_soft_by_two_are_found_to_be(tmp_path, body):
+def test_springs_half_as_stiff_are_fitted_back(tmp_path, body):
     """The truth is the force of the same body with its full stiffness, which runs measure: nothing is assumed of how
     forces grow with it."""
     case = Case(SQUEEZE, body, frames=None)
@@ -111,8 +111,8 @@ def test_springs_made_too_soft_by_two_are_found_to_be(tmp_path, body):
     runs.references[SQUEEZE.name] = reference  # type: ignore[assignment]
     soft = scaled(body, (STIFFNESS,), (0.5,))
     assert soft.stiffness == 0.5
-    found = fit(soft, [SQUEEZE], runs.errors)
-    assert found.recipe.stiffness == pytest.approx(1.0, rel=0.01)
+    fitted = fit(soft, [SQUEEZE], runs.errors)
+    assert fitted.recipe.stiffness == pytest.approx(1.0, rel=0.01)
     assert 3 <= runs.made <= 12
 
 
@@ -125,7 +125,7 @@ def test_a_parameter_says_what_the_recipe_holds():
 
 
 @pytest.mark.parametrize(
-    ("recipe", "said"),
+    ("recipe", "message"),
     [
         (BodyRecipe("quadratic", 594), "unknown body for a calibration 'quadratic'"),
         (BodyRecipe("membrane", law="lloyd"), "unknown body for a calibration 'membrane'"),
@@ -133,6 +133,6 @@ def test_a_parameter_says_what_the_recipe_holds():
         (BodyRecipe(law="cotangent", volumes="nodal"), "volumes 'nodal' is not calibrated"),
     ],
 )
-def test_what_has_a_better_element_is_not_calibrated(recipe, said):
-    with pytest.raises(StudyError, match=said):
+def test_what_has_a_better_element_is_not_calibrated(recipe, message):
+    with pytest.raises(StudyError, match=message):
         parameters_of(recipe)

@@ -49,7 +49,7 @@ def rewritten(path, change):
 
 
 @pytest.mark.parametrize(
-    ("change", "kind", "said"),
+    ("change", "kind", "message"),
     [
         (lambda whole: whole["calibration"]["recipe"].update(stiffness=2.0), DamagedFile, "was changed after"),
         (lambda whole: whole["calibration"].update(verdict="holds!"), DamagedFile, "was changed after"),
@@ -59,9 +59,9 @@ def rewritten(path, change):
         (lambda whole: whole.update(calibration=[1]), StudyError, "is JSON, but not a calibration"),
     ],
 )
-def test_a_changed_file_is_one_sentence(path, change, kind, said):
+def test_a_changed_file_is_one_sentence(path, change, kind, message):
     rewritten(path, change)
-    with pytest.raises(kind, match=said):
+    with pytest.raises(kind, match=message):
         calibrated(path)
 
 
@@ -111,5 +111,5 @@ def test_no_file_and_a_folder(tmp_path):
 
 
 def test_what_was_not_chosen_is_not_lost(tmp_path):
-    found = replace(made_up(), recipe=BodyRecipe(nodes=301, stiffness=1.25, volumes="whole", law="uniform"))
-    assert calibrated(write_calibration(tmp_path, found)) == found.recipe
+    calibration = replace(made_up(), recipe=BodyRecipe(nodes=301, stiffness=1.25, volumes="whole", law="uniform"))
+    assert calibrated(write_calibration(tmp_path, calibration)) == calibration.recipe

@@ -19,7 +19,7 @@ HOLDS, MEMORISES, UNRESOLVED = Verdict
         ((-30.0, -15.0), (-40.0, -28.0), HOLDS),  # 30 % where 25 % are due
         ((-30.0, -15.0), (-40.0, -34.0), MEMORISES),  # 15 % where 25 % are due
         ((-30.0, 0.0), (0.4, 0.3), UNRESOLVED),  # nothing there to gain
-        ((5.0, 4.5), (6.0, 5.4), UNRESOLVED),  # changes less than is known
+        ((5.0, 4.5), (6.0, 5.4), UNRESOLVED),  # changes by less than the uncertainty
         ((5.0, 4.5), (6.0, 9.0), MEMORISES),  # and does harm
         ((5.0, 8.0), (6.0, 8.8), UNRESOLVED),  # given up for another quantity, as much in both
         ((5.0, 8.0), (6.0, 12.0), MEMORISES),  # and more in the other
@@ -32,7 +32,7 @@ def test_verdict_of_one_scene_each(fitted, judged, verdict):
 
 
 def test_no_reference_is_better_than_its_uncertainty():
-    """The same numbers, better and less well known."""
+    """The same numbers with smaller and larger uncertainties."""
     pairs = (-30.0, 0.0), (-33.0, -10.0)
     for uncertainty, verdict in ((1.0, HOLDS), (7.0, UNRESOLVED), (40.0, UNRESOLVED)):
         assert verdict_of([Compared(*pairs[0], 1.0)], [Compared(*pairs[1], uncertainty)]) is verdict
@@ -47,7 +47,7 @@ def test_several_scenes_count_by_their_mean_square():
     assert verdict_of(fitted, [Compared(-12.0, 0.0, 1.0), bad, bad]) is MEMORISES  # 10.7 -> 8.2
 
 
-def test_nothing_compared_nothing_told():
+def test_without_a_comparison_there_is_no_verdict():
     pair = Compared(-30.0, 0.0, 1.0)
     assert verdict_of([], [pair]) is None and verdict_of([pair], []) is None
 

@@ -1,4 +1,4 @@
-"""`organbench doctor` finds what is made to be absent, and names the line that mends it."""
+"""`organbench doctor` finds what a test takes away, and names the command that repairs it."""
 
 import os
 import re
@@ -35,24 +35,24 @@ def test_an_extra_adds_to_what_is_required():
 
 
 def test_a_package_that_is_missing_or_too_old_is_named_with_the_line_that_installs_it():
-    found = software.packages([Requirement("not-there>=2"), Requirement("numpy>=999"), Requirement("scipy>=1")])
-    assert found.level is Level.FAULT
-    assert "not-there is not installed, numpy is " in found.said and "but >=999 is required" in found.said
-    assert found.mend == f"{sys.executable} -m pip install 'not-there>=2' 'numpy>=999'"
+    finding = software.packages([Requirement("not-there>=2"), Requirement("numpy>=999"), Requirement("scipy>=1")])
+    assert finding.level is Level.FAULT
+    assert "not-there is not installed, numpy is " in finding.said and "but >=999 is required" in finding.said
+    assert finding.mend == f"{sys.executable} -m pip install 'not-there>=2' 'numpy>=999'"
 
 
 def test_an_extra_that_is_missing_is_no_fault():
-    found = software.extra("view", [Requirement("not-there>=2")])
-    assert (found.level, found.mend) == (Level.NOTE, f"{sys.executable} -m pip install 'not-there>=2'")
+    finding = software.extra("view", [Requirement("not-there>=2")])
+    assert (finding.level, finding.mend) == (Level.NOTE, f"{sys.executable} -m pip install 'not-there>=2'")
 
 
-def test_a_distribution_that_is_not_installed_is_said(monkeypatch):
+def test_a_distribution_that_is_not_installed_is_a_fault(monkeypatch):
     def absent(name):
         raise PackageNotFoundError(name)
 
     monkeypatch.setattr(software, "requires", absent)
-    (found,) = software.software()
-    assert found.level is Level.FAULT and found.mend.endswith("pip install --editable .")
+    (finding,) = software.software()
+    assert finding.level is Level.FAULT and finding.mend.endswith("pip install --editable .")
 
 
 @pytest.fixture
@@ -68,16 +68,16 @@ def broken(tmp_path, monkeypatch):
 
 def test_a_missing_system_library_is_named_with_the_packages_of_debian(broken):
     broken("raise OSError('libGLU.so.1: cannot open shared object file: No such file or directory')")
-    found = software.loads("gmsh")
-    assert found.level is Level.FAULT and "libGLU.so.1" in found.said
-    assert "libglu1-mesa" in found.mend and (shutil.which("apt-get") is None or "apt-get install -y" in found.mend)
+    finding = software.loads("gmsh")
+    assert finding.level is Level.FAULT and "libGLU.so.1" in finding.said
+    assert "libglu1-mesa" in finding.mend and (shutil.which("apt-get") is None or "apt-get install -y" in finding.mend)
 
 
 @pytest.mark.parametrize("line", ["raise ImportError('half a package')", "import os; os.abort()"])
-def test_a_package_that_is_there_and_does_not_load_is_installed_anew(broken, line):
+def test_a_package_that_is_there_and_does_not_load_is_reinstalled(broken, line):
     broken(line)
-    found = software.loads("gmsh")
-    assert found.level is Level.FAULT and "--force-reinstall --no-deps gmsh==" in found.mend
+    finding = software.loads("gmsh")
+    assert finding.level is Level.FAULT and "--force-reinstall --no-deps gmsh==" in finding.mend
 
 
 def test_elsewhere_than_on_debian_the_packages_are_named(monkeypatch):
@@ -95,8 +95,8 @@ def test_a_cache_that_cannot_be_written_to(tmp_path, monkeypatch):
     (tmp_path / "file").write_text("")
     folder = tmp_path / "file" / "cache"
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(folder))
-    found = machine_checks.cache("compiled code", folder, "NUMBA_CACHE_DIR")
-    assert (found.level, found.mend) == (Level.FAULT, "unset NUMBA_CACHE_DIR")
+    finding = machine_checks.cache("compiled code", folder, "NUMBA_CACHE_DIR")
+    assert (finding.level, finding.mend) == (Level.FAULT, "unset NUMBA_CACHE_DIR")
     monkeypatch.delenv("NUMBA_CACHE_DIR")
     again = machine_checks.cache("compiled code", folder, "NUMBA_CACHE_DIR")
     assert again.mend.startswith("export NUMBA_CACHE_DIR=")
@@ -105,8 +105,8 @@ def test_a_cache_that_cannot_be_written_to(tmp_path, monkeypatch):
 
 def test_a_disk_without_room(tmp_path, monkeypatch):
     monkeypatch.setattr(machine_checks.shutil, "disk_usage", lambda folder: SPACE(10**12, 10**12, 5 * 10**8))
-    found = machine_checks.room("results", tmp_path / "not" / "yet")
-    assert found.level is Level.FAULT and "0.5 GB free" in found.said and str(tmp_path) in found.mend
+    finding = machine_checks.room("results", tmp_path / "not" / "yet")
+    assert finding.level is Level.FAULT and "0.5 GB free" in finding.said and str(tmp_path) in finding.mend
 
 
 def test_little_memory_one_core_and_no_compiler(monkeypatch):

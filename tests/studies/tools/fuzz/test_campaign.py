@@ -25,10 +25,10 @@ def test_a_process_that_dies_costs_its_trial_alone(monkeypatch):
     monkeypatch.setattr(campaign, "CHUNK", 2)
     monkeypatch.setattr(campaign, "try_all", deadly)
     heard = []
-    found = run_trials([drawn(0, number) for number in range(4)], 2, heard.append)
-    assert [outcome.trial.number for outcome in found] == list(range(4)) and len(heard) == 4
-    assert [outcome.trial.number for outcome in found if outcome.status == UNEXPLAINED] == [DEADLY]
-    assert "died" in found[DEADLY].message
+    outcomes = run_trials([drawn(0, number) for number in range(4)], 2, heard.append)
+    assert [outcome.trial.number for outcome in outcomes] == list(range(4)) and len(heard) == 4
+    assert [outcome.trial.number for outcome in outcomes if outcome.status == UNEXPLAINED] == [DEADLY]
+    assert "died" in outcomes[DEADLY].message
 
 
 def test_the_table_counts_every_trial():

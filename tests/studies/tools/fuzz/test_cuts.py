@@ -67,9 +67,9 @@ def test_a_trial_is_made_gentler_choice_by_choice():
 )
 def test_what_cannot_be_cut_is_refused_before_it_is_meshed(changes, words, monkeypatch):
     monkeypatch.setattr(module, "mesh_of", lambda trial, scene: 1 // 0)
-    found = tried(replace(CALM, **changes))
-    assert found.status == "refused"
-    assert any(part in found.message for part in words.split("|")), found.message
+    outcome = tried(replace(CALM, **changes))
+    assert outcome.status == "refused"
+    assert any(part in outcome.message for part in words.split("|")), outcome.message
 
 
 @pytest.mark.slow
@@ -88,15 +88,15 @@ def test_what_cannot_be_cut_is_refused_before_it_is_meshed(changes, words, monke
     ],
 )
 def test_cuts_that_can_be_run(changes):
-    found = tried(replace(CALM, **changes))
-    assert (found.status, found.message) == ("ok", "")
+    outcome = tried(replace(CALM, **changes))
+    assert (outcome.status, outcome.message) == ("ok", "")
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("number", range(3))
 def test_random_cuts_end_by_name(number):
-    found = tried(draw(7, number))
-    assert found.status != UNEXPLAINED, found.message
+    outcome = tried(draw(7, number))
+    assert outcome.status != UNEXPLAINED, outcome.message
 
 
 def test_an_error_that_is_not_ours_and_a_mesher_that_dies_are_findings(monkeypatch):

@@ -56,26 +56,26 @@ def test_everything_is_drawn():
     ],
 )
 def test_each_end_has_its_name(changes, status, words):
-    found = tried(replace(CALM, **changes))
-    assert (found.status, words in found.message) == (status, True), found.message
+    outcome = tried(replace(CALM, **changes))
+    assert (outcome.status, words in outcome.message) == (status, True), outcome.message
 
 
 def test_time_is_processor_time_and_has_an_end():
-    found = tried(PRESSED, seconds=0.0)
-    assert (found.status, found.message) == ("timed-out", "0 of 2 requested times reached")
+    outcome = tried(PRESSED, seconds=0.0)
+    assert (outcome.status, outcome.message) == ("timed-out", "0 of 2 requested times reached")
 
 
 def test_an_error_that_is_not_ours_is_the_finding(monkeypatch):
     monkeypatch.setattr(module, "task_of", lambda trial, ask: 1 // 0)
-    found = tried(CALM)
-    assert found.status == UNEXPLAINED and found.message.startswith("ZeroDivisionError")
+    outcome = tried(CALM)
+    assert outcome.status == UNEXPLAINED and outcome.message.startswith("ZeroDivisionError")
 
 
 def test_an_error_without_the_states_that_converged_is_unexplained(monkeypatch):
     """The mutant: a failure that forgets what was reached."""
     stuck = replace(CALM, load="press", depth=0.9, steps=30, iterations=5, smallest_step=1.0, element="P1")
-    found = tried(stuck)
-    assert found.status == "not-converged" and 0 < found.reached.count < 30
+    outcome = tried(stuck)
+    assert outcome.status == "not-converged" and 0 < outcome.reached.count < 30
     solve = module._solve
 
     def forgets(task, reached):
@@ -97,23 +97,23 @@ def pressed():
 
 
 def test_a_state_of_rest_meets_every_truth(pressed):
-    system, found, state = pressed
-    assert broken(system, found, state) is None and np.abs(found.obstacle_force).max() > 0.0
-    assert min(corner_ratio(system, found.u)) > 0.0
+    system, equilibrium, state = pressed
+    assert broken(system, equilibrium, state) is None and np.abs(equilibrium.obstacle_force).max() > 0.0
+    assert min(corner_ratio(system, equilibrium.u)) > 0.0
 
 
 def test_each_truth_is_missed_by_what_breaks_it(pressed):
-    """Mutants of a state: what is told, and the unknowns behind it."""
-    system, found, state = pressed
+    """Mutants of a state: the sentence that each gets, and the unknowns behind it."""
+    system, equilibrium, state = pressed
 
     def hears(words, **changes):
-        assert words in str(broken(system, replace(found, **changes), state))
+        assert words in str(broken(system, replace(equilibrium, **changes), state))
 
-    hears("not finite", u=found.u * np.nan)
-    hears("least volume ratio", J=found.J * 0.0)
+    hears("not finite", u=equilibrium.u * np.nan)
+    hears("least volume ratio", J=equilibrium.J * 0.0)
     hears("energies", energy=-1.0)
-    hears("volume of the surface", volume=found.volume * (1.0 + 1e-7))
-    hears("out of balance", obstacle_force=found.obstacle_force * 1.01)
+    hears("volume of the surface", volume=equilibrium.volume * (1.0 + 1e-7))
+    hears("out of balance", obstacle_force=equilibrium.obstacle_force * 1.01)
     count = system.displacement_count
     for first, last, size, words in ((0, count, 1e-6, "nodes without contact"), (count, None, 1.0, "mean pressure")):
         x = state.x.copy()
@@ -123,18 +123,18 @@ def test_each_truth_is_missed_by_what_breaks_it(pressed):
             * np.arange(len(x))[first:last]
             / len(x)
         )
-        assert words in " ".join(sentences(system, found, replace(state, x=x)))
-    assert "inside an obstacle" in " ".join(sentences(system, found, replace(state, x=0.5 * state.x)))
+        assert words in " ".join(sentences(system, equilibrium, replace(state, x=x)))
+    assert "inside an obstacle" in " ".join(sentences(system, equilibrium, replace(state, x=0.5 * state.x)))
 
 
-def sentences(system, found, state):
+def sentences(system, equilibrium, state):
     """Of every truth that is missed."""
-    return [sentence for wrong, sentence in at_rest(system, found, state) if wrong]
+    return [sentence for wrong, sentence in at_rest(system, equilibrium, state) if wrong]
 
 
 def test_corners_turned_inside_out_are_seen(pressed):
-    system, found, _ = pressed
-    u = found.u.copy()
+    system, equilibrium, _ = pressed
+    u = equilibrium.u.copy()
     u[system.problem.mesh.t[0, 0]] += 10.0 * np.ptp(system.nodes)
     assert corner_ratio(system, u)[0] < 0.0 < corner_ratio(system, u)[1]
 
@@ -152,9 +152,9 @@ def test_counts_and_last_states_are_stored():
     assert set(table[table["choice"] == "element"]["value"]) == {"P1", "P2/P1"}
     with np.load(BytesIO(last_states(outcomes))) as stored:
         assert {name.split("/")[0] for name in stored} == {"5"}
-        found = outcomes[1].reached.equilibrium
-        assert found is not None
-        np.testing.assert_array_equal(stored["5/u"], found.u)
+        equilibrium = outcomes[1].reached.equilibrium
+        assert equilibrium is not None
+        np.testing.assert_array_equal(stored["5/u"], equilibrium.u)
 
 
 @pytest.mark.slow

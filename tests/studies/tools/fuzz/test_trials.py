@@ -43,7 +43,7 @@ def test_bodies_are_upright_and_as_odd_as_they_are_called(shape):
         assert extent[2] < 0.1 * extent[0]
 
 
-def test_masses_and_the_origin_are_where_they_are_asked():
+def test_masses_and_the_origin_are_those_of_the_trial():
     plain, odd = body_of(CALM), body_of(replace(CALM, heaviest=1e6, far=10.0))
     ratio = odd.mass / plain.mass
     assert ratio.max() / ratio.min() > 1e3
@@ -63,9 +63,9 @@ def test_masses_and_the_origin_are_where_they_are_asked():
 )
 def test_each_end_has_its_name(changes, status, monkeypatch):
     monkeypatch.setattr(module, "SECONDS", 600.0)  # compiling counts, on a busy machine
-    found = tried(replace(CALM, **changes))
-    assert found.status == status
-    assert bool(found.message) == (status != "ok")
+    outcome = tried(replace(CALM, **changes))
+    assert outcome.status == status
+    assert bool(outcome.message) == (status != "ok")
 
 
 def test_an_error_that_is_not_ours_is_the_finding(monkeypatch):
@@ -73,8 +73,8 @@ def test_an_error_that_is_not_ours_is_the_finding(monkeypatch):
         raise ZeroDivisionError("in the middle")
 
     monkeypatch.setattr(module, "setup_of", fails)
-    found = tried(CALM)
-    assert (found.status, found.message) == (UNEXPLAINED, "ZeroDivisionError: in the middle")
+    outcome = tried(CALM)
+    assert (outcome.status, outcome.message) == (UNEXPLAINED, "ZeroDivisionError: in the middle")
 
 
 @pytest.fixture(scope="module")
@@ -115,19 +115,19 @@ def test_threads_are_compared_bit_for_bit(pressed, monkeypatch):
 
 
 def test_a_failure_is_reduced_to_the_choices_that_matter():
-    """A target beside ten harmless choices."""
+    """A target among ten harmless choices."""
     noisy = replace(CALM, nodes=80, gravity=9.81, friction=0.5, modulus=5e4, far=10.0, dt_fraction=3.9)
     noisy = replace(noisy, load="plane", steps=600, heaviest=30.0)
     assert tried(noisy).status == "diverged"
-    found = simplest(tried(noisy))
-    assert found.status == "diverged" and set(found.trial.changed) <= {
+    outcome = simplest(tried(noisy))
+    assert outcome.status == "diverged" and set(outcome.trial.changed) <= {
         "dt_fraction",
         "steps",
         "load",
         "heaviest",
         "nodes",
     }
-    assert "dt_fraction" in found.trial.changed
+    assert "dt_fraction" in outcome.trial.changed
 
 
 def test_a_trial_is_made_gentler_choice_by_choice_and_by_halves():
@@ -135,11 +135,11 @@ def test_a_trial_is_made_gentler_choice_by_choice_and_by_halves():
     assert [(trial.nodes, trial.gravity) for trial in trials] == [(12, 9.81), (80, 0.0), (36, 9.81)]
 
 
-def test_a_method_that_forgets_the_volume_is_found(monkeypatch):
+def test_a_method_that_forgets_the_volume_drifts_or_inverts(monkeypatch):
     """The mutant: implicit_volume that runs as free."""
     monkeypatch.setattr(ImplicitVolume, "advance", lambda self, state, boundary: Free().advance(state, boundary))
-    found = tried(replace(CALM, load="pinch", depth=0.6, speed=10.0, nodes=40, steps=600, damping=0.3))
-    assert found.status in ("drifted", "inverted")
+    outcome = tried(replace(CALM, load="pinch", depth=0.6, speed=10.0, nodes=40, steps=600, damping=0.3))
+    assert outcome.status in ("drifted", "inverted")
 
 
 def test_errors_of_bodies_are_sentences():
@@ -149,5 +149,5 @@ def test_errors_of_bodies_are_sentences():
 
 def test_elements_refuse_a_body_whose_only_volume_is_the_whole():
     """A single tetrahedron: its one patch is its surface, which no sums over elements keep."""
-    found = tried(draw(7, 156))
-    assert found.status == "refused" and "keep one volume per node" in found.message
+    outcome = tried(draw(7, 156))
+    assert outcome.status == "refused" and "keep one volume per node" in outcome.message

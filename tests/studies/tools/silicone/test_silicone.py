@@ -45,10 +45,10 @@ def test_the_numbers_are_those_of_the_files(load):
     if not FILES.is_dir():
         pytest.skip("the measured files are not part of the project")
     for run, file in enumerate(load.files):
-        found = np.array(runs_of(FILES / file))
-        np.testing.assert_allclose(1e3 * found[:, 0], load.sag[run], atol=0.006)
-        assert found[:, 1].mean() == pytest.approx(load.frequency[run], abs=6e-4)
-        assert found[:, 2].mean() == pytest.approx(load.damping[run], abs=6e-5)
+        rows = np.array(runs_of(FILES / file))
+        np.testing.assert_allclose(1e3 * rows[:, 0], load.sag[run], atol=0.006)
+        assert rows[:, 1].mean() == pytest.approx(load.frequency[run], abs=6e-4)
+        assert rows[:, 2].mean() == pytest.approx(load.damping[run], abs=6e-5)
 
 
 def test_the_weights_are_those_of_52_and_102_grams():
@@ -95,9 +95,9 @@ def test_both_solvers_let_the_same_beam_swing():
     beam, load = Beam(2, 6), LOADS[1]
     t, sag = reference_swing(beam, YOUNGS, load, 5.0, 2.2, 0.01)
     truth = swing_of(t, sag.mean(axis=1))
-    found = swing_of(*_mean(Contestant("", beam, "quadratic", ImplicitVolume()).swing(YOUNGS, load, 5.0, 2.2)))
-    assert found.frequency == pytest.approx(truth.frequency, rel=0.01)
-    assert found.sag == pytest.approx(reference_rest(beam, YOUNGS, load).mean(), rel=0.01)
+    swing = swing_of(*_mean(Contestant("", beam, "quadratic", ImplicitVolume()).swing(YOUNGS, load, 5.0, 2.2)))
+    assert swing.frequency == pytest.approx(truth.frequency, rel=0.01)
+    assert swing.sag == pytest.approx(reference_rest(beam, YOUNGS, load).mean(), rel=0.01)
 
 
 def _mean(swing: tuple[np.ndarray, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
