@@ -1,4 +1,4 @@
-"""`organbench advise` says what was measured, how well that is known, what it costs and how to run it again."""
+"""`organbench advise` prints errors with their uncertainties, the cost, and the command that repeats the run."""
 
 import shutil
 from pathlib import Path
@@ -22,7 +22,7 @@ STUDY = Study("mine", "Does it run?", tuple(Case(s, BodyRecipe(), ImplicitVolume
 
 
 @pytest.fixture
-def told(organbench, tmp_path):
+def advise(organbench, tmp_path):
     """Asks about a scene of a published campaign: the answer as one text."""
     publish(tmp_path, [*rows_of(LIVER_PRESS), *rows_of(LIVER_PROBE), *rows_of(KIDNEY_PROBE)])
 
@@ -34,40 +34,40 @@ def told(organbench, tmp_path):
     return ask
 
 
-def test_an_answer_holds_recipe_errors_cost_source_and_commands(told, tmp_path):
-    out = told("liver_press")
+def test_an_answer_holds_recipe_errors_cost_source_and_commands(advise, tmp_path):
+    out = advise("liver_press")
     assert "liver_press: force within 3 %, displacement within 1 % (default target" in out
     assert "adaptive quadratic, masses by stiffness, 994 surface nodes, dt = 0.8 dt_c, 2 ms" in out
     assert "−1.2 ± 0.5 %" in out and "0.8 ± 0.1 %" in out
     assert "0.5 ms per 1 ms of simulated time, 2 times real time, on this machine" in out
     assert str(tmp_path / "published" / "accuracy" / "accuracy.csv") in out.replace("\n", "")
     (name,) = (line.split("--case ")[1] for line in out.splitlines() if "--case" in line)
-    wanted = Case(LIVER_PRESS, GRADED, dt_fraction=0.8, timed=True)
-    assert wanted in [case.replaced(recorded=()) for case in ACCURACY.cases if case.name == name]
+    timed = Case(LIVER_PRESS, GRADED, dt_fraction=0.8, timed=True)
+    assert timed in [case.replaced(recorded=()) for case in ACCURACY.cases if case.name == name]
     (python,) = (line.split("in Python")[1] for line in out.splitlines() if "in Python" in line)
     made = eval(python, {"Case": Case, "BodyRecipe": BodyRecipe, "LIVER_PRESS": LIVER_PRESS})
     assert made == Case(LIVER_PRESS, GRADED, dt_fraction=0.8)
 
 
-def test_a_miss_says_by_how_much(told):
-    out = told("liver_press", "--budget", "250us")
+def test_a_miss_says_by_how_much(advise):
+    out = advise("liver_press", "--budget", "250us")
     assert "at most 0.25 ms of computing per 1 ms of simulated time" in out
     assert "no body meets it; the closest candidate is (displacement 1.4 times too large):" in out
 
 
-def test_a_wish_finer_than_the_reference_cannot_be_told(told):
-    assert "undecided: the reference is only known to ±0.5 % of the force" in told("liver_press", "--force", "0.4%")
+def test_a_wish_finer_than_the_reference_is_undecided(advise):
+    assert "undecided: the reference is only known to ±0.5 % of the force" in advise("liver_press", "--force", "0.4%")
 
 
-def test_a_wish_within_the_uncertainty_is_said(told):
-    assert "reaches beyond the target (displacement)" in told("liver_press", "--displacement", "0.85 %")
-    assert "reaches beyond" not in told("liver_press")
+def test_a_wish_within_the_uncertainty_has_a_remark(advise):
+    assert "reaches beyond the target (displacement)" in advise("liver_press", "--displacement", "0.85 %")
+    assert "reaches beyond" not in advise("liver_press")
 
 
-def test_a_scene_of_the_user_gets_the_worst_of_its_kind(told, tmp_path):
+def test_a_scene_of_the_user_gets_the_worst_of_its_kind(advise, tmp_path):
     file = tmp_path / "mine.py"
     file.write_text(STUDY.format(scenes="[MINE]"))
-    out = told(file, "--no-timing")
+    out = advise(file, "--no-timing")
     assert "this scene has not run: errors are the worst of liver_probe, kidney_probe, scenes of the same kind" in out
     assert "on another machine" in out and "in Python     Case(scene, BodyRecipe(kind='quadratic'" in out
 
@@ -86,7 +86,7 @@ def test_a_budget_without_a_time_is_not_met(organbench, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("words", "message"),
     [
         (("liver_pres",), "unknown scene 'liver_pres'; did you mean 'liver_press'"),
         (("liver_press", "--force", "much"), "force 'much' is not a tolerance"),
@@ -98,8 +98,8 @@ def test_a_budget_without_a_time_is_not_met(organbench, tmp_path):
         (("nothing.py",), "there is no file nothing.py"),
     ],
 )
-def test_bad_input_is_one_sentence(refused, no_tables, tmp_path, words, said):
-    assert said in refused("advise", *words, "--results", tmp_path)
+def test_bad_input_is_one_sentence(refused, no_tables, tmp_path, words, message):
+    assert message in refused("advise", *words, "--results", tmp_path)
 
 
 @pytest.mark.parametrize("package", [False, True], ids=["in a checkout", "in a wheel"])
@@ -125,11 +125,11 @@ def test_a_file_of_two_scenes_is_one_sentence(refused, tmp_path):
 
 def test_a_case_that_there_is_not_is_answered_with_the_nearest(refused, tmp_path):
     name = ACCURACY.cases[0].name
-    said = refused("run", "accuracy", "--case", f"{name}x", "--results", tmp_path)
-    assert f"unknown case of accuracy '{name}x'; did you mean '{name}'" in said
+    sentence = refused("run", "accuracy", "--case", f"{name}x", "--results", tmp_path)
+    assert f"unknown case of accuracy '{name}x'; did you mean '{name}'" in sentence
 
 
-def test_one_case_of_a_study_can_be_asked_for(organbench, tmp_path):
+def test_one_case_of_a_study_can_be_run(organbench, tmp_path):
     case = next(c for c in ACCURACY.cases if c.scene == LIVER_PRESS)
     code, out, _ = organbench("run", "accuracy", "--case", case.name, "--dry-run", "--results", tmp_path)
     assert code == 0 and "1 case (missing)" in out and "1 timing (missing)" in out

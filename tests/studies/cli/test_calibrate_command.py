@@ -10,7 +10,7 @@ from studies.tools.calibrate.words import lines_of
 from tests.studies.tools.calibrate.made_up_errors import made_up
 
 
-def test_a_stored_calibration_is_told_again(organbench, tmp_path):
+def test_a_stored_calibration_is_printed_again(organbench, tmp_path):
     code, out, err = organbench("calibrate", write_calibration(tmp_path, made_up()))
     assert (code, err) == (0, "") and out.splitlines() == lines_of(made_up())
 
@@ -30,7 +30,7 @@ def test_the_table_shows_both_sides():
 
 
 @pytest.mark.parametrize(
-    ("verdicts", "said"),
+    ("verdicts", "message"),
     [
         ((Verdict.HOLDS, Verdict.HOLDS), "force: the fit generalises:"),
         ((Verdict.HOLDS, Verdict.MEMORISES), "force: the fit overfits:"),
@@ -38,23 +38,23 @@ def test_the_table_shows_both_sides():
         ((Verdict.UNRESOLVED, Verdict.UNRESOLVED), "force: not resolvable:"),
     ],
 )
-def test_the_worst_trial_of_a_quantity_has_its_sentence(verdicts, said):
+def test_the_worst_trial_of_a_quantity_has_its_sentence(verdicts, message):
     (trial,) = made_up().trials
     lines = lines_of(made_up(trials=tuple(replace(trial, force=verdict) for verdict in verdicts)))
-    assert sum(line.startswith("force: ") for line in lines) == sum(said in line for line in lines) == 1
+    assert sum(line.startswith("force: ") for line in lines) == sum(message in line for line in lines) == 1
     assert not any(line.startswith("displacement: ") for line in lines)
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("words", "message"),
     [
         (("livr",), "unknown organ 'livr'; did you mean 'liver'"),
         (("liver", "--body", "surfac"), "unknown body 'surfac'; did you mean 'surface'"),
         (("none.json",), "there is no calibration none.json"),
     ],
 )
-def test_bad_input_is_one_sentence(refused, tmp_path, words, said):
-    assert said in refused("calibrate", *words, "--results", tmp_path)
+def test_bad_input_is_one_sentence(refused, tmp_path, words, message):
+    assert message in refused("calibrate", *words, "--results", tmp_path)
 
 
 def test_an_organ_without_a_reference_is_one_sentence(refused, tmp_path, monkeypatch):

@@ -96,7 +96,7 @@ def test_status_counts_and_says_why(organbench, tiny_file, results):
     assert why[diverged + 1] == f"    {diverging_case().name}"
 
 
-def test_status_names_some_of_many_and_all_when_asked(organbench, tmp_path):
+def test_status_names_some_of_many_and_all_with_an_option(organbench, tmp_path):
     code, out, _ = organbench("status", "volume_loss", "--results", tmp_path)
     (rest,) = (int(line.split()[1]) for line in out.splitlines() if "more (--all names them)" in line)
     assert code == 0
@@ -164,8 +164,8 @@ def test_table_as_parquet_keeps_digits_and_types(organbench, tiny_file, results,
 
 def test_parquet_without_its_package_is_one_sentence(refused, tiny_file, results, tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "pyarrow", None)
-    said = refused("table", tiny_file, "--results", results, "--parquet", tmp_path / "t.parquet")
-    assert "needs the package pyarrow" in said and not (tmp_path / "t.parquet").exists()
+    sentence = refused("table", tiny_file, "--results", results, "--parquet", tmp_path / "t.parquet")
+    assert "needs the package pyarrow" in sentence and not (tmp_path / "t.parquet").exists()
 
 
 def test_table_of_chosen_metrics(organbench, tiny_file, results):

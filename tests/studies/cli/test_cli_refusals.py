@@ -21,7 +21,7 @@ REPOSITORY = Path(__file__).parents[3]
 
 
 @pytest.mark.parametrize(
-    ("words", "told"),
+    ("words", "message"),
     [
         (("run", "volume_los"), "unknown study 'volume_los'; did you mean 'volume_loss'"),
         (("run", "volume_loss", "frame_rat"), "unknown study 'frame_rat'; did you mean 'frame_rate'"),
@@ -47,9 +47,9 @@ REPOSITORY = Path(__file__).parents[3]
     ],
     ids=lambda value: " ".join(value) if isinstance(value, tuple) else "",
 )
-def test_unknown_words_get_the_nearest_match(refused, tmp_path, monkeypatch, words, told):
+def test_unknown_words_get_the_nearest_match(refused, tmp_path, monkeypatch, words, message):
     monkeypatch.setenv("ORGANBENCH_RESULTS", str(tmp_path))
-    assert told in refused(*words)
+    assert message in refused(*words)
     assert list(tmp_path.iterdir()) == []
 
 
@@ -60,8 +60,8 @@ def test_a_file_in_the_place_of_the_results_folder(refused, tmp_path):
 
 
 def test_a_study_of_which_nothing_is_stored_is_not_drawn(refused, tmp_path):
-    told = refused("plot", "volume_loss", "--results", tmp_path / "none")
-    assert "nothing of volume_loss is stored" in told and "run `organbench run volume_loss` first" in told
+    sentence = refused("plot", "volume_loss", "--results", tmp_path / "none")
+    assert "nothing of volume_loss is stored" in sentence and "run `organbench run volume_loss` first" in sentence
     assert not (tmp_path / "none").exists()
 
 
@@ -84,12 +84,12 @@ def test_output_that_is_not_taken(organbench, monkeypatch):
 
 def test_a_folder_that_may_not_be_entered(refused, tiny_file, results, monkeypatch):
     """The superuser may enter every folder, so the system's answer is made up."""
-    asked = os.stat
+    real_stat = os.stat
 
     def stat(path, *words, **more):
         if str(path).startswith(str(results / "tiny")):
             raise PermissionError(errno.EACCES, "Permission denied", str(path))
-        return asked(path, *words, **more)
+        return real_stat(path, *words, **more)
 
     monkeypatch.setattr(os, "stat", stat)
     for command in ("status", "run", "table"):
@@ -120,7 +120,7 @@ def test_results_that_cannot_be_written(refused, tiny_file, finished_sweep, tmp_
 
 
 def test_bad_meshes_fail_and_the_study_goes_on(organbench, tmp_path):
-    """Open, in millimetres, not there: two failed records, one warning, and the good case beside them."""
+    """Open, in millimetres, not there: two failed records, one warning, and the good case among them."""
     points, triangles, _ = cube(2)
     outer = np.unique(triangles)
     box = points[outer], np.searchsorted(outer, triangles)
@@ -142,10 +142,10 @@ def test_bad_meshes_fail_and_the_study_goes_on(organbench, tmp_path):
     assert "  failed: open.obj: the surface is open" in out and "missing.obj; check the name (file_3-" in out
     assert "large.obj: the bounding box is 100 x 100 x 100 m; if the file is in millimetres, say unit='mm'" in err
     assert "Traceback" not in err
-    found = [read_record(path) for path in record_files(results, "tiny")]
-    assert [record.status for record in found] == [Status.OK, Status.FAILED, Status.OK, Status.FAILED]
-    assert "open.obj: the surface is open" in found[1].message
-    assert "missing.obj" in found[3].message
+    records = [read_record(path) for path in record_files(results, "tiny")]
+    assert [record.status for record in records] == [Status.OK, Status.FAILED, Status.OK, Status.FAILED]
+    assert "open.obj: the surface is open" in records[1].message
+    assert "missing.obj" in records[3].message
     code, out, _ = organbench("status", file, "--results", results)
     assert "2 ok, 2 failed" in out or "2 failed, 2 ok" in out
 

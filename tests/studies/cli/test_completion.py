@@ -52,8 +52,8 @@ def completed(*words: str) -> tuple[list[str], list[str]]:
     ids=" ".join,
 )
 def test_what_is_offered(words, offered):
-    found, loaded = completed(*words)
-    assert found == offered
+    completions, loaded = completed(*words)
+    assert completions == offered
     if not any(word.startswith("-") for word in words):
         assert loaded == []
 

@@ -1,4 +1,4 @@
-"""References of scenes beside the second judge: what is compared, what is allowed, and what would be seen."""
+"""References of scenes and the second judge: what is compared, what is allowed, and what would be seen."""
 
 from pathlib import Path
 from types import SimpleNamespace
@@ -125,7 +125,7 @@ def test_the_judge_of_a_cut_agrees_with_the_reference_on_one_mesh(monkeypatch):
     np.testing.assert_allclose(theirs.displacement(places), moved, atol=2e-3 * largest)
 
 
-def test_a_judge_that_sees_half_of_the_opening_is_told():
+def test_a_judge_that_sees_half_of_the_opening_is_off_by_half():
     """Where the reference's coarsest mesh is parted the two are compared; a published mesh is rounded."""
     reference = reference_for(Path(), BALL_INCISED)
     half, whole = (

@@ -42,7 +42,7 @@ def write(tmp_path):
         ((SEVERAL, SCENE), f":{SQUEEZE.name}", SQUEEZE.name),
     ],
 )
-def test_a_scene_is_found(write, parts, word, name):
+def test_a_scene_is_read_from_a_file(write, parts, word, name):
     assert find_scene(write(*parts) + word).name == name
 
 

@@ -57,8 +57,8 @@ def test_the_sum_is_judged_in_every_frame(frame):
 
 
 def test_what_a_cut_did_is_read_off_the_record():
-    known = {"cut_energy": 0.02, "cut_momentum": 0.03, "cut_limit_ratio": 0.9, "cut_seconds": 0.004}
-    values = [of(name, **cut_run(TARGET, **known)) for name in NAMES[2:]]
+    attributes = {"cut_energy": 0.02, "cut_momentum": 0.03, "cut_limit_ratio": 0.9, "cut_seconds": 0.004}
+    values = [of(name, **cut_run(TARGET, **attributes)) for name in NAMES[2:]]
     assert values == pytest.approx([2.0, 3.0, 0.9, 4.0], rel=1e-12)
 
 
@@ -95,12 +95,12 @@ def test_the_mouth_of_a_cut_is_compared_with_its_own_side(part):
     assert error == pytest.approx(100 * part / 2, abs=1e-9)
 
 
-def test_faces_of_a_cut_are_found_where_a_published_reference_is_rounded():
+def test_faces_of_a_cut_are_recognised_in_a_rounded_reference():
     """What lies twice at one place within 1e-6 of the size is no surface of the organ."""
     inner = np.sort(CELLS[:, [[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]]].reshape(-1, 3), axis=1)
     faces = np.unique(inner[(np.abs(POINTS[inner][..., 2]) < 1e-12).all(axis=1)], axis=0)
     opening = opened(CELLS, faces, len(POINTS))
     noise = np.random.default_rng(3).uniform(-1e-7, 1e-7, (len(opening.parent), 3))
     facets = boundary_triangles(opening.cells.astype(int))
-    found = run(**cut_run(TARGET))._outside(POINTS[opening.parent] + noise, facets)
-    assert len(facets) - len(found) == 2 * len(faces) == 16
+    outside = run(**cut_run(TARGET))._outside(POINTS[opening.parent] + noise, facets)
+    assert len(facets) - len(outside) == 2 * len(faces) == 16

@@ -47,8 +47,8 @@ def test_a_recipe_that_is_right_on_four_meshes_is_not_recommended():
 def test_a_quadratic_recipe_on_one_mesh_is_no_answer_where_others_ran_on_five():
     single = row(replace(BODY, contact="nodes"), 0.1, 0.1, cost=0.01)
     linear = row(BodyRecipe(nodes=550), 30.0, 10.0)
-    found = over_meshes([*five(), single, linear])
-    assert [one.case.body for one in found] == [BODY, linear.case.body]
+    rows = over_meshes([*five(), single, linear])
+    assert [one.case.body for one in rows] == [BODY, linear.case.body]
     assert over_meshes([single, linear]) == [single, linear]  # alone it counts, and says so
 
 

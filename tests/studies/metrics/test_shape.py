@@ -85,20 +85,20 @@ def test_a_flat_sphere_loses_what_its_triangles_cut_off():
 
 def test_of_a_filled_hollow_organ_the_lumen_counts():
     mesh = organ("bladder", 400)
-    known = Organ("bladder", {})
+    bladder = Organ("bladder", {})
     sides = rest_surfaces(mesh.points, mesh.triangles)
     assert sides[LUMEN].volume == pytest.approx(-mesh.lumen_volume) and sides[OUTER].volume > 0
-    whole = shape_errors(known, sides, filled=True)
+    whole = shape_errors(bladder, sides, filled=True)
     points, inner = mesh.points.copy(), np.unique(sides[LUMEN].facets)
     middle = points[inner].mean(axis=0)
     points[inner] = middle + 0.9 * (points[inner] - middle)
     smaller = rest_surfaces(points, mesh.triangles)
-    shrunk = shape_errors(known, smaller, filled=True)
+    shrunk = shape_errors(bladder, smaller, filled=True)
     assert shrunk.distance > 2 * whole.distance and shrunk.volume > 0.3
     outer = {OUTER: smaller[OUTER]}
-    alone = shape_errors(known, outer, filled=False)
+    alone = shape_errors(bladder, outer, filled=False)
     assert alone.distance <= whole.distance and abs(alone.volume) < 0.05
-    assert np.isnan(shape_errors(known, outer, filled=True)).all()  # a filled body without the lumen is another organ
+    assert np.isnan(shape_errors(bladder, outer, filled=True)).all()  # a filled body without the lumen is another organ
 
 
 @pytest.mark.parametrize("name", ["liver", "bladder"])
@@ -118,7 +118,7 @@ def test_a_mesh_file_that_comes_as_it_is_is_the_truth(tmp_path):
     assert shape_of(run) == pytest.approx((0.0, 0.0), abs=1e-9)
 
 
-def test_without_its_file_a_shape_is_not_known(tmp_path):
+def test_without_its_file_a_body_has_no_shape_error(tmp_path):
     points, triangles, cells = cube()
     file = write_obj(tmp_path / "gone.obj", points, triangles)
     scene = file_scene(file)
@@ -128,7 +128,7 @@ def test_without_its_file_a_shape_is_not_known(tmp_path):
         assert np.isnan(shape_of(replace(run, case=replace(run.case, scene=scene, body=BodyRecipe())))).all()
 
 
-def test_a_record_whose_facets_cannot_be_told_has_no_shape(ball):
+def test_a_record_whose_facets_are_in_another_order_has_no_shape(ball):
     run = ball_run(replace(ball, triangles=ball.triangles[::-1]))
     assert np.isnan(shape_of(run)).all()
 
@@ -143,10 +143,10 @@ def test_a_liver_that_is_five_per_cent_shorter_is_caught_by_metric_table_and_adv
     assert list(table["shape_volume [%]"]) == pytest.approx([shape_of(whole)[1], volume])
     kept = [row(LIVER_PRESS, body, numbers) for body, numbers in LADDER.items() if body != GRADED]
     shown = {"shape_error [%]": distance, "shape_volume [%]": volume}
-    found = advise(
+    advice = advise(
         LIVER_PRESS, results=publish(tmp_path, [*kept, row(LIVER_PRESS, LIVER, LADDER[GRADED]) | shown]), timing=False
     )
-    assert found.meets and found.chosen is not None and found.chosen.case.body.nodes == 1194
-    assert found.misshapen is not None and found.misshapen.case.body == LIVER
-    (line,) = [line for line in lines_of(found) if line.startswith("not recommended: ")]
+    assert advice.meets and advice.chosen is not None and advice.chosen.case.body.nodes == 1194
+    assert advice.misshapen is not None and advice.misshapen.case.body == LIVER
+    (line,) = [line for line in lines_of(advice) if line.startswith("not recommended: ")]
     assert f"{distance:.3g} % of the liver's size" in line and f"lacks {-volume:.3g} % of its volume" in line

@@ -41,16 +41,16 @@ def test_what_the_body_lacks_beyond_a_hundredth_of_the_size_is_an_error(gap):
     """One side of the cube lies `gap` % of the size inside the reference's; everything else is right."""
     size = EDGE * 3**0.5
     short = POINTS - [gap / 100 * size, 0.0, 0.0] * (POINTS[:, :1] > 0)
-    found = of("mean_error", values=body_of(short, TRIANGLES, cube()[2], even), reference=reference(even))
+    error = of("mean_error", values=body_of(short, TRIANGLES, cube()[2], even), reference=reference(even))
     beyond = max(0.0, gap - SHAPE) / 100 * size * areas()[POINTS[:, 0] > 0].sum()
-    assert found == pytest.approx(100 * beyond / 0.03, rel=1e-9, abs=1e-9)
+    assert error == pytest.approx(100 * beyond / 0.03, rel=1e-9, abs=1e-9)
 
 
 def test_nothing_is_left_out():
     """A body that is nowhere near: the whole distance counts."""
     far = POINTS + np.array([1.0, 0.0, 0.0])
-    found = of("mean_error", values=body_of(far, TRIANGLES, cube()[2], even), reference=reference(even))
-    assert found > 100 * (1.0 - EDGE - SHAPE / 100 * EDGE * 3**0.5) / 0.03
+    error = of("mean_error", values=body_of(far, TRIANGLES, cube()[2], even), reference=reference(even))
+    assert error > 100 * (1.0 - EDGE - SHAPE / 100 * EDGE * 3**0.5) / 0.03
 
 
 def test_what_lies_between_the_body_s_nodes_counts():
@@ -62,8 +62,8 @@ def test_what_lies_between_the_body_s_nodes_counts():
     points, triangles, cells = cube(1, EDGE)
     body = body_of(points, triangles, cells, wave)
     assert of("surface_error", values=body, reference=reference(even)) == pytest.approx(100.0)
-    found = of("mean_error", values=body, reference=reference(wave))
-    assert found == pytest.approx(100 * areas()[np.abs(POINTS[:, 2]) < 1e-9].sum(), rel=1e-9)
+    error = of("mean_error", values=body, reference=reference(wave))
+    assert error == pytest.approx(100 * areas()[np.abs(POINTS[:, 2]) < 1e-9].sum(), rel=1e-9)
 
 
 def test_between_the_nodes_of_curved_facets_the_displacement_is_quadratic():
@@ -102,7 +102,7 @@ def test_a_surface_body_of_a_hollow_organ_is_compared_with_the_outer_surface():
     assert of("mean_error", values=hollow, reference=truth) == pytest.approx(100 * share * 2 / 3, rel=1e-9)
 
 
-def test_a_record_whose_facets_cannot_be_told_has_no_mean_error():
+def test_a_quadratic_record_with_linear_facets_has_no_mean_error():
     made = run()
     odd = replace(made, case=replace(made.case, body=replace(made.case.body, kind="quadratic")))
     assert np.isnan(metric("mean_error")(odd))
@@ -128,7 +128,7 @@ def test_of_an_octant_the_whole_ball_is_compared():
     assert len(np.unique(np.round(whole.points[outside], 12), axis=0)) == len(outside)
 
 
-def test_a_large_facet_is_found_behind_many_small_ones():
+def test_the_nearest_facet_may_be_a_large_one_behind_many_small_ones():
     """Its centroid is farther away than those of forty others, and it is nearer."""
     large = np.array([[0.0, 0, 0], [10, 0, 0], [0, 10, 0]])
     small = np.array([9.0, 0.2, 1.0]) + 0.05 * np.random.default_rng(2).normal(size=(120, 3))

@@ -102,8 +102,8 @@ def test_the_study_of_a_scene_takes_the_nodes_that_its_warning_needs(scene):
 
 
 def test_where_there_is_a_reference_it_judges():
-    known = [replace(one, reference=made_up_run.reference()) for one in (body_run(FINE), body_run(COARSE))]
-    assert verdicts(known) == []
+    runs = [replace(one, reference=made_up_run.reference()) for one in (body_run(FINE), body_run(COARSE))]
+    assert verdicts(runs) == []
 
 
 def test_one_mesh_is_no_verdict_and_a_failed_run_none():

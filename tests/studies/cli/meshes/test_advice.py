@@ -76,20 +76,21 @@ def test_advice_that_does_not_work_is_not_printed(organbench, tmp_path):
     assert json.loads(organbench("mesh-check", path, "--unit", "mm", "--json")[1])["command"] is None
 
 
-def test_what_no_option_mends_and_what_is_large_is_not_tried(tmp_path, monkeypatch):
-    asked = []
-    monkeypatch.setattr(advice, "scan", lambda *words, **how: asked.append(how))
+def test_what_no_option_repairs_and_what_is_large_is_not_tried(tmp_path, monkeypatch):
+    calls = []
+    monkeypatch.setattr(advice, "scan", lambda *words, **how: calls.append(how))
     large = Source(stored(tmp_path / "large.ply", POINTS, FACES[3:]), "mm")
     monkeypatch.setattr(advice, "MOST", 100)
-    found = advice.tried(large, examine(large))
-    assert found.command is None and found.findings[0].mend.startswith("try organbench mesh --from FILE --close-holes")
+    checked = advice.tried(large, examine(large))
+    assert checked.command is None
+    assert checked.findings[0].mend.startswith("try organbench mesh --from FILE --close-holes")
     nan = POINTS.copy()
     nan[0] = np.nan
     bad = Source(stored(tmp_path / "nan.ply", nan, FACES), "mm")
     assert advice.tried(bad, examine(bad)).command is None
     sound = Source(stored(tmp_path / "sound.ply", POINTS, FACES))
     assert advice.tried(sound, examine(sound)) == examine(sound)  # its unit alone is a question
-    assert not asked
+    assert not calls
 
 
 def test_the_command_takes_the_file_as_it_was_taken(tmp_path):
@@ -98,8 +99,8 @@ def test_the_command_takes_the_file_as_it_was_taken(tmp_path):
         (Source(path, "cm", 0.1), ["--unit", "cm", "--scale", "0.1"]),
         (Source(path, longest_side=0.06, part="1"), ["--longest-side", "0.06m", "--part", "1"]),
     ):
-        told = shlex.split(advice.command(source, {"smooth": 0.003}))
-        assert told[4 : 4 + len(words)] == words and told[4 + len(words) :][:4] == ["--nodes", "550", "--smooth", "3"]
+        parts = shlex.split(advice.command(source, {"smooth": 0.003}))
+        assert parts[4 : 4 + len(words)] == words and parts[4 + len(words) :][:4] == ["--nodes", "550", "--smooth", "3"]
 
 
 @pytest.mark.slow
@@ -124,28 +125,28 @@ def test_what_is_left_is_named(monkeypatch, tmp_path):
 
 
 def test_a_file_of_no_organs_size_is_not_meshed(monkeypatch, tmp_path):
-    """First its unit must be known: 2 m is no organ's length in m, cm or mm."""
+    """Its unit is missing: 2 m is no organ's length in m, cm or mm."""
     monkeypatch.setattr(advice, "scan", lambda *words, **how: pytest.fail("meshed"))
     source = Source(stored(tmp_path / "large.ply", POINTS / 30.5, FACES[3:]))
     findings = advice.tried(source, examine(source)).findings
     assert "an organ's in no unit we know" in findings[0].sentence and findings[1].mend.startswith("try ")
 
 
-def test_what_is_no_organ_is_refused_and_found(organbench, tmp_path, monkeypatch):
+def test_what_is_no_organ_is_a_finding_and_a_refusal(organbench, tmp_path, monkeypatch):
     """0.5 mL, and a body a million metres from the origin: by check as findings, by mesh and place as a sentence."""
     monkeypatch.chdir(tmp_path)
     small = (0.5e3 / (4 / 3 * np.pi * 30 * 25 * 20)) ** (1 / 3)
     stored("small_liver.ply", small * POINTS, FACES)
     meshio.write_points_cells("far_liver.vtu", POINTS + np.array([1e9, 0, 0]), [("triangle", FACES)])
-    for name, told in (
+    for name, message in (
         ("small_liver.ply", "encloses 0.49 mL, and no organ is smaller than 1 mL"),
         ("far_liver.vtu", "it lies 1e+06 m from the origin of its coordinates"),
     ):
         code, out, _ = organbench("mesh-check", name, "--unit", "mm")
-        assert code == 1 and told in out and TRIED not in out
+        assert code == 1 and message in out and TRIED not in out
         for words in (("mesh", "--from", name, "--nodes", 200), ("mesh", "--from", name), ("place", name)):
             code, _, err = organbench(*words, "--unit", "mm")
-            assert code == 2 and told in err, words
+            assert code == 2 and message in err, words
     assert sorted(path.name for path in tmp_path.iterdir()) == ["far_liver.vtu", "small_liver.ply"]
 
 

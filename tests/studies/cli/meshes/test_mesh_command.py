@@ -50,12 +50,12 @@ def test_an_organ_that_few_nodes_cannot_hold_names_the_number_that_does(organben
 def test_the_number_that_is_named_has_been_tried():
     """One number gives no mesh, one a mesh that does not keep the shape, the third one does."""
     few, many = (Made(organ("ball", nodes, fill=False, exact=True), None) for nodes in (60, 300))
-    truth, asked = Organ("ball", {}), []
+    truth, counts = Organ("ball", {}), []
 
     def answers(*given):
         def make(count):
-            asked.append(count)
-            answer = given[min(len(asked), len(given)) - 1]
+            counts.append(count)
+            answer = given[min(len(counts), len(given)) - 1]
             if answer is None:
                 raise StudyError("no surface is well shaped")
             return answer
@@ -64,16 +64,16 @@ def test_the_number_that_is_named_has_been_tried():
 
     assert "nodes" not in closeness(many, truth, answers())
     assert closeness(few, truth, answers(None, few, many)).endswith(
-        f"; {asked[2]:,} nodes keep it within 1 % and 0.5 %"
+        f"; {counts[2]:,} nodes keep it within 1 % and 0.5 %"
     )
-    assert len(asked) == 3 and few.mesh.outer_count < asked[0] < asked[1] < asked[2]
-    asked.clear()
-    told = closeness(few, truth, answers(few))
-    assert told.endswith(f"; {asked[-1]:,} nodes do not keep it within 1 % and 0.5 % either")
+    assert len(counts) == 3 and few.mesh.outer_count < counts[0] < counts[1] < counts[2]
+    counts.clear()
+    sentence = closeness(few, truth, answers(few))
+    assert sentence.endswith(f"; {counts[-1]:,} nodes do not keep it within 1 % and 0.5 % either")
 
 
 @pytest.mark.slow
-def test_an_organ_is_meshed_and_found_clean(organbench, tmp_path):
+def test_an_organ_is_meshed_without_faults(organbench, tmp_path):
     target = tmp_path / "kidney.vtu"
     code, out, err = organbench("mesh", "kidney", "--nodes", 200, "--seed", 3, "-o", target)
     assert code == 0 and "warning" not in err
@@ -146,15 +146,15 @@ def test_findings_and_their_exit_code(organbench, tmp_path):
     assert "so it has no inside and no volume" in out
     assert "-> organbench mesh --from FILE --close-holes" in out
     code, out, _ = organbench("mesh-check", path, "--json")
-    found = json.loads(out)
-    assert code == 1 and not found["clean"] and found["findings"][0]["code"] == "open"
-    assert found["measures"]["open_edges"] == found["findings"][0]["count"] > 0
+    report = json.loads(out)
+    assert code == 1 and not report["clean"] and report["findings"][0]["code"] == "open"
+    assert report["measures"]["open_edges"] == report["findings"][0]["count"] > 0
     closed = tmp_path / "closed.ply"
     assert organbench("mesh", "--from", path, "--close-holes", "-o", closed)[0] == 0
     assert organbench("mesh-check", closed)[0] == 0
 
 
-def asked_wrongly(folder):
+def wrong_options(folder):
     """Arguments for an egg, or for no file, and the message expected."""
     egg = stored(folder / "egg.ply", POINTS, FACES)
     out, scan = ("-o", folder / "out.vtu"), ("mesh", "--from", egg, "--unit", "mm")
@@ -213,25 +213,25 @@ def no_mesh(folder):
 
 
 def test_bad_input_is_one_sentence_and_nothing_is_written(refused, tmp_path):
-    cases = asked_wrongly(tmp_path) | no_mesh(tmp_path)
+    cases = wrong_options(tmp_path) | no_mesh(tmp_path)
     before = sorted(os.listdir(tmp_path))
-    for case, (words, told) in cases.items():
-        assert told in refused(*words), case
+    for case, (words, message) in cases.items():
+        assert message in refused(*words), case
         assert sorted(os.listdir(tmp_path)) == before, case
 
 
-def test_a_person_is_asked_for_the_unit_and_before_large_files(organbench, egg, tmp_path, monkeypatch):
-    asked = []
+def test_on_a_terminal_it_asks_for_the_unit_and_before_large_files(organbench, egg, tmp_path, monkeypatch):
+    prompts = []
 
     def prompt(question, default):
-        asked.append((question, default))
+        prompts.append((question, default))
         return "mm"
 
     monkeypatch.setattr(commands.sys.stdin, "isatty", lambda: True, raising=False)
     monkeypatch.setattr(commands.typer, "prompt", prompt)
     target = tmp_path / "out.ply"
     assert organbench("mesh", "--from", egg, "-o", target)[0] == 0
-    ((question, default),) = asked
+    ((question, default),) = prompts
     assert "longest side is 60, the size of an organ in centimetres or millimetres" in question and default == "mm"
     assert np.ptp(read_mesh(target).points[:, 0]) == pytest.approx(0.06, rel=1e-6)
     monkeypatch.setattr(commands, "size_warning", lambda path: "it is large")

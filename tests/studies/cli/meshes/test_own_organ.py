@@ -152,6 +152,6 @@ def test_bad_input_is_one_sentence(refused, scan_file, tmp_path):
         ("place", "scan.ply", "--unit", "mm", "--probe", "1,nan,3"): "give finite numbers",
     }
     before = sorted(p.name for p in tmp_path.iterdir())
-    for words, told in cases.items():
-        assert told in refused(*words)
+    for words, message in cases.items():
+        assert message in refused(*words)
         assert sorted(p.name for p in tmp_path.iterdir()) == before

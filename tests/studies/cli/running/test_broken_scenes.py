@@ -279,7 +279,7 @@ def test_what_lies_in_a_lumen_is_not_inside_the_wall():
 
 
 def test_a_study_that_expects_failures_is_not_held_up(organbench, tmp_path):
-    """A population draws its scenes at random: one that cannot start is a failed case of it, and told as such."""
+    """A population draws its scenes at random: one that cannot start is a failed case of it."""
     file = tmp_path / "mine.py"
     text = STUDY.format(changes=BROKEN["sphere inside"][0], charts="(), expects=('failed',)")
     file.write_text(text, encoding="utf-8")

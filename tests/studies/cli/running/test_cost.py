@@ -84,7 +84,7 @@ def test_the_table_counts_the_pairs_that_sleep(mesh_cache):
     """Of the thin probe on the stomach nearly all pairs sleep, and the line says what was still compared."""
     table = cost_table(tiny_case(scene=STOMACH_SLIDE, body=BodyRecipe("surface", 300)), repeats=1)
     assert "thin probe: none" not in set(table["what"])
-    (line,) = (told for told in table["how much"] if told)
+    (line,) = (text for text in table["how much"] if text)
     pairs, boxes = re.search(r"of ([0-9,]+) pairs a step ([0-9.e+]+) boxes compared", line).groups()
     assert 0 < float(boxes) < 0.5 * int(pairs.replace(",", ""))
     assert line.endswith("left behind 0")

@@ -62,7 +62,7 @@ def test_a_divergence_that_the_study_does_not_expect_is_exit_code_1(organbench, 
 
 
 def test_only_what_is_chosen_decides(organbench, results, file_of):
-    """The failed case runs again and is ok; the one that diverged was not asked for."""
+    """The failed case runs again and is ok; the one that diverged was not chosen."""
     put(case_path(results, "tiny", tiny_case()), status=Status.FAILED, message="no room")
     path = file_of(FILE.format("expects=()"))
     code, out, _ = organbench("run", path, "--results", results, "--only", "failed", "--jobs", 1)
@@ -121,13 +121,13 @@ def test_the_catalogue_expects_what_it_has_published():
     """No published case ends as its study does not expect. What a study expects does happen: 60 cases of the stability
     map diverged, 19 recoveries ended inverted, hanging spleens in accuracy, organs and literature did. Only recoveries,
     whose starts are meant to break a method, may also end in ways that no published case did."""
-    found = {study.name: published_statuses(study) for study in STUDIES}
-    assert all(study.accepts(status) for study in STUDIES for status in found[study.name])
+    published = {study.name: published_statuses(study) for study in STUDIES}
+    assert all(study.accepts(status) for study in STUDIES for status in published[study.name])
     expected = {study.name: set(study.expects) for study in STUDIES if study.expects}
     assert expected.keys() == {"stability_map", "stress", "accuracy", "organs", "literature"}
-    assert expected.pop("stress") - found["stress"] == {"diverged", "drifted"}
+    assert expected.pop("stress") - published["stress"] == {"diverged", "drifted"}
     for name, statuses in expected.items():
-        assert statuses == found[name] - {"ok", "skipped"}
+        assert statuses == published[name] - {"ok", "skipped"}
 
 
 def test_an_unknown_status_cannot_be_expected():

@@ -86,9 +86,9 @@ def test_killed_half_way_goes_on_where_it_was(tmp_path):
 @pytest.mark.slow
 def test_ctrl_c_half_way_goes_on_where_it_was(tmp_path):
     process = interrupted(tmp_path, signal.SIGINT)
-    _, said = process.communicate(timeout=60)
+    _, errors = process.communicate(timeout=60)
     assert process.returncode == 130
-    assert said.strip() == SAID
+    assert errors.strip() == SAID
     finish(tmp_path)
 
 

@@ -139,7 +139,7 @@ def broken():
 
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
 @pytest.mark.parametrize("end", [finished, left, refused, broken, press, interrupts.stop_if_pressed])
-def test_once_pressed_nothing_else_is_told(end, organbench, monkeypatch):
+def test_once_pressed_the_interrupt_is_the_only_message(end, organbench, monkeypatch):
     def app():
         Swallowing()
         end()

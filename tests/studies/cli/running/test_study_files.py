@@ -131,11 +131,11 @@ CHARTS = {
 
 @pytest.mark.parametrize("fault", BROKEN)
 def test_a_study_file_that_is_wrong(refused, tmp_path, fault):
-    text, told = BROKEN[fault]
+    text, message = BROKEN[fault]
     path = tmp_path / "mine.py"
     path.write_text(text)
     for command in ("run", "table", "status"):
-        assert told in refused(command, path, "--results", tmp_path / "results")
+        assert message in refused(command, path, "--results", tmp_path / "results")
     assert not (tmp_path / "results").exists()
 
 

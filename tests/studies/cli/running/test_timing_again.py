@@ -89,7 +89,7 @@ def test_old_times_stay_where_the_new_ones_are_not_whole(results, monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("words", "told"),
+    ("words", "message"),
     [
         (("--again", "timings"), "unknown value of --again 'timings'; did you mean 'timing'"),
         (("--again", "timing", "--only", "failed"), "leave out --only"),
@@ -98,9 +98,9 @@ def test_old_times_stay_where_the_new_ones_are_not_whole(results, monkeypatch):
     ],
     ids=lambda value: " ".join(value) if isinstance(value, tuple) else "",
 )
-def test_what_does_not_go_together_is_one_sentence(refused, tiny_file, results, words, told):
+def test_what_does_not_go_together_is_one_sentence(refused, tiny_file, results, words, message):
     before = content(results / "tiny")
-    assert told in refused("run", tiny_file, "--results", results, *words)
+    assert message in refused("run", tiny_file, "--results", results, *words)
     assert content(results / "tiny") == before
 
 

@@ -17,14 +17,14 @@ from tests.studies.tools.advise.made_up_campaign import GRADED, publish, rows_of
 
 
 def test_frames_are_timed_as_often_as_the_protocol_says(mesh_cache):
-    found = short_timing(tiny_case())
-    assert found.timing.frame_ns.shape == (REPEATS, FRAMES) and (found.timing.frame_ns > 0).all()
-    assert found.covered == pytest.approx(tiny_case().scene.duration)
+    short = short_timing(tiny_case())
+    assert short.timing.frame_ns.shape == (REPEATS, FRAMES) and (short.timing.frame_ns > 0).all()
+    assert short.covered == pytest.approx(tiny_case().scene.duration)
 
 
 def test_a_dear_case_is_timed_over_its_first_frames(mesh_cache):
-    found = short_timing(tiny_case(frames=50), seconds=1e-9)
-    assert found.frames == 1 and found.covered == pytest.approx(tiny_case().scene.duration / 50)
+    short = short_timing(tiny_case(frames=50), seconds=1e-9)
+    assert short.frames == 1 and short.covered == pytest.approx(tiny_case().scene.duration / 50)
 
 
 def test_a_case_that_breaks_off_is_one_sentence(mesh_cache):
@@ -40,10 +40,10 @@ def made_up(case):
 def test_advice_times_what_was_timed_elsewhere(tmp_path, monkeypatch):
     monkeypatch.setattr(answers, "short_timing", made_up)
     results = publish(tmp_path, rows_of(LIVER_PRESS), machine="0badcafe")
-    found = advise(LIVER_PRESS, results=results)
-    assert found.chosen.case.body == GRADED and found.meets and found.chosen.timed_here
-    assert found.real_time == pytest.approx(0.5) and found.chosen.dt == 3e-3
-    assert found.chosen.cost.uncertainty == pytest.approx(0.5 * 0.04 * 2.0 / 1.02)
+    advice = advise(LIVER_PRESS, results=results)
+    assert advice.chosen.case.body == GRADED and advice.meets and advice.chosen.timed_here
+    assert advice.real_time == pytest.approx(0.5) and advice.chosen.dt == 3e-3
+    assert advice.chosen.cost.uncertainty == pytest.approx(0.5 * 0.04 * 2.0 / 1.02)
     assert not advise(LIVER_PRESS, budget=1.0, results=results).meets
     assert advise(LIVER_PRESS, budget=1.0, results=results, timing=False).meets
 

@@ -14,9 +14,9 @@ def test_percentiles_are_times_that_frames_took():
 
 @given(st.lists(st.integers(1, 10**9), min_size=1, max_size=50))
 def test_percentiles_are_ordered_and_measured(times):
-    found = percentiles(np.array(times))
-    assert list(found.values()) == sorted(found.values())
-    assert set(found.values()) <= set(map(float, times))
+    percentile_of = percentiles(np.array(times))
+    assert list(percentile_of.values()) == sorted(percentile_of.values())
+    assert set(percentile_of.values()) <= set(map(float, times))
 
 
 def test_a_deadline_is_missed_only_when_exceeded():
@@ -61,7 +61,7 @@ def test_ranks_of_the_sign_test():
         assert _sign_test_rank(n) == (rank, pytest.approx(confidence, abs=1e-12))
 
 
-def test_equal_contestants_are_rarely_told_apart():
+def test_equal_contestants_rarely_differ():
     # 2,000 races of two equal contestants with heavy-tailed noise, 7 repeats, confidence 0.984 at rank 1:
     # wrongly resolved 1.6 % of the time; 3 % is six standard deviations of that count away.
     rng = np.random.default_rng(1)

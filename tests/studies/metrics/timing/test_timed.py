@@ -70,8 +70,8 @@ def can_be_timed(root, case):
 
 def test_current_until_the_code_changes_or_on_another_machine(results, monkeypatch):
     assert why_untimed(results, KEPT) is None
-    for asked in (module, jobs_module):
-        monkeypatch.setattr(asked, "case_fingerprint", lambda case: "edited")
+    for caller in (module, jobs_module):
+        monkeypatch.setattr(caller, "case_fingerprint", lambda case: "edited")
     assert why_untimed(results, KEPT) == CODE_CHANGED
     assert read_timing(results, KEPT) is None
     monkeypatch.undo()
@@ -90,7 +90,7 @@ def test_what_diverged_or_never_ran_is_not_timed(results):
 
 
 def test_methods_of_one_body_take_turns(results, monkeypatch):
-    """Their ratio is wanted: a slow minute of the machine must fall on both. Another step is another group."""
+    """What counts is their ratio: a slow minute of the machine must fall on both. Another step is another group."""
     turns = []
 
     def spy(setup, **warm_up):
@@ -100,15 +100,15 @@ def test_methods_of_one_body_take_turns(results, monkeypatch):
 
     monkeypatch.setattr(module, "simulate", spy)
     other = tiny_case(dt_fraction=0.25, timed=True)
-    told = []
-    time_cases(results, "tiny", [KEPT, other, LOOSE], told.append)
+    names = []
+    time_cases(results, "tiny", [KEPT, other, LOOSE], names.append)
     steps, finer = (prepare(case).setup.clock.steps for case in (KEPT, other))
     assert steps != finer
     pairs = [turns[k : k + 2] for k in range(0, 2 * module.REPEATS, 2)]
     assert all({name for name, _ in pair} == {"implicit_volume", "free"} for pair in pairs)
     assert {pair[0][0] for pair in pairs} == {"implicit_volume", "free"}  # each goes first now and then
     assert turns[len(pairs) * 2 :] == [("implicit_volume", finer)] * module.REPEATS
-    assert sorted(told) == sorted([KEPT.name, other.name, LOOSE.name])
+    assert sorted(names) == sorted([KEPT.name, other.name, LOOSE.name])
 
 
 def test_a_long_run_is_timed_less_often(monkeypatch):
@@ -126,14 +126,14 @@ def test_a_run_that_breaks_off_while_timed_is_not_stored(results, monkeypatch):
     assert content(results / "tiny") == before
 
 
-def test_unwritable_timing_is_told(tmp_path):
+def test_a_timing_that_cannot_be_written_is_an_error(tmp_path):
     (tmp_path / "file").write_text("no folder")
     timing = FrameTiming(np.full((2, 3), 10))
     with pytest.raises(StudyError, match="was not written"):
         write_timing(tmp_path / "file", "tiny", KEPT, timing)
 
 
-def test_the_time_of_each_stage_is_stored_beside_the_frames(finished_sweep):
+def test_the_time_of_each_stage_is_stored_with_the_frames(finished_sweep):
     record = read_record(timing_file(finished_sweep, "tiny", tiny_case(timed=True)))
     stages, times = record.fields["stages"].values.tolist(), record.fields["stage_ns"].values
     assert times.shape == (len(stages), record.fields["frame_ns"].values.shape[1])

@@ -29,7 +29,7 @@ def test_pinned_to_one_core_and_one_thread_and_back():
     assert numba.get_num_threads() == threads
 
 
-def test_linear_algebra_uses_no_more_threads_than_were_asked_for():
+def test_linear_algebra_uses_no_more_threads_than_the_timing():
     """A pool that waits for work on the pinned core takes every other slice of time from what is measured."""
     np.ones((2, 2)) @ np.ones((2, 2))
     with threadpool_limits(2):
