@@ -53,12 +53,12 @@ def volume(points, cells):
 
 
 def test_meshes_fit_the_ball_and_each_other(exported):
-    found = json.loads((exported / "scene.json").read_text())
-    straight, curved = (meshio.read(exported / found["meshes"][kind]["file"]) for kind in ("straight", "curved"))
+    data = json.loads((exported / "scene.json").read_text())
+    straight, curved = (meshio.read(exported / data["meshes"][kind]["file"]) for kind in ("straight", "curved"))
     (cells,), (quadratic,) = ([block.data for block in mesh.cells] for mesh in (straight, curved))
     assert [block.type for block in (*straight.cells, *curved.cells)] == ["tetra", "tetra10"]
     assert (volume(straight.points, cells) > 0).all() and (volume(curved.points, quadratic[:, :4]) > 0).all()
-    assert volume(straight.points, cells).sum() == pytest.approx(found["meshes"]["straight"]["volumes"]["whole"])
+    assert volume(straight.points, cells).sum() == pytest.approx(data["meshes"]["straight"]["volumes"]["whole"])
     # Each middle node lies between the right corners, bent outward by the height of its arc at most.
     for middle, (i, j) in enumerate([(0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3)], 4):
         ends = curved.points[quadratic[:, [i, j]]]
@@ -71,8 +71,8 @@ def test_meshes_fit_the_ball_and_each_other(exported):
 
 
 def test_held_nodes_are_the_caps_and_move_as_the_scene_says(exported):
-    found = json.loads((exported / "scene.json").read_text())
-    bottom, top = found["held"]
+    data = json.loads((exported / "scene.json").read_text())
+    bottom, top = data["held"]
     for mesh in (meshio.read(exported / name) for name in ("straight.vtu", "curved.vtu", "surface.vtu")):
         z = mesh.points[:, 2]
         outer = mesh.point_data.get("outer", np.ones(len(z)))
@@ -84,7 +84,7 @@ def test_held_nodes_are_the_caps_and_move_as_the_scene_says(exported):
     assert "(0, 0, -0.0125) m at 3 s" in top["path"]["words"] and "does not move" in bottom["path"]["words"]
     with (exported / "paths.csv").open() as file:
         rows = {float(row["t"]): float(row["held_top_z"]) for row in csv.DictReader(file)}
-    assert set(found["checkpoints"]) <= set(rows)
+    assert set(data["checkpoints"]) <= set(rows)
     assert {t: rows[t] for t in (0.0, 1.5, 3.0, 4.0)} == pytest.approx({0: 0, 1.5: -0.00625, 3: -0.0125, 4: -0.0125})
 
 
@@ -98,19 +98,19 @@ def test_the_surface_is_closed_and_shares_its_nodes(exported):
     assert (np.einsum("ij,ij->i", np.cross(b - a, c - a), a + b + c) > 0).all()
 
 
-def test_material_times_and_what_is_judged_are_said(exported):
-    found = json.loads((exported / "scene.json").read_text())
-    assert (found["schema"], found["version"]) == ("organbench-scene", 1)
-    assert found["material"]["shear_modulus"] == 1800.0 and found["material"]["bulk_modulus"] == 5000 * 1800.0
-    assert found["material"]["density"] == 1060.0 and found["damping"]["rate"] == 15.0
-    assert found["checkpoints"] == [0.6, 1.2, 1.8, 2.4, 4.0] == pytest.approx(list(BALL_CLAMPED.checkpoints))
-    judged = {metric["name"]: metric for metric in found["judged"]}
+def test_the_export_names_material_times_and_what_is_judged(exported):
+    data = json.loads((exported / "scene.json").read_text())
+    assert (data["schema"], data["version"]) == ("organbench-scene", 1)
+    assert data["material"]["shear_modulus"] == 1800.0 and data["material"]["bulk_modulus"] == 5000 * 1800.0
+    assert data["material"]["density"] == 1060.0 and data["damping"]["rate"] == 15.0
+    assert data["checkpoints"] == [0.6, 1.2, 1.8, 2.4, 4.0] == pytest.approx(list(BALL_CLAMPED.checkpoints))
+    judged = {metric["name"]: metric for metric in data["judged"]}
     assert {"force_end", "surface_error", "volume_worst"} <= set(judged) and "frequency_error" not in judged
     assert all(metric["unit"] and "[" in metric["definition"] for metric in judged.values())
     page = (exported / "README.md").read_text()
     assert "organbench judge ball_clamped FILE --nodes 150" in page and "{" not in page
-    for said in ("metres", "mu = 1800 Pa", "held_top", *judged, "positive in compression"):
-        assert said in page
+    for phrase in ("metres", "mu = 1800 Pa", "held_top", *judged, "positive in compression"):
+        assert phrase in page
 
 
 @pytest.mark.parametrize("scene", EXPORTED, ids=lambda scene: scene.name)
@@ -141,10 +141,10 @@ def test_the_page_holds_what_our_own_bodies_reach(exported, tmp_path, organbench
 
 @pytest.mark.parametrize("scene", EXPORTED, ids=lambda scene: scene.name)
 def test_every_scene_has_words_for_all_that_happens(scene):
-    found = description(scene, [], "")
-    assert json.loads(json.dumps(found)) == json.loads(json.dumps(found)) and found["force"]["words"]
-    assert len(found["obstacles"]) == len(scene.obstacles) and all(entry["words"] for entry in found["obstacles"])
-    assert [metric["name"] for metric in found["judged"]] == [metric.name for metric in judged_metrics(scene)]
+    data = description(scene, [], "")
+    assert json.loads(json.dumps(data)) == json.loads(json.dumps(data)) and data["force"]["words"]
+    assert len(data["obstacles"]) == len(scene.obstacles) and all(entry["words"] for entry in data["obstacles"])
+    assert [metric["name"] for metric in data["judged"]] == [metric.name for metric in judged_metrics(scene)]
     assert ("lumen_volume_factor" in paths_table(scene)) == (scene.lumen is not None)
 
 

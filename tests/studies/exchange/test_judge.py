@@ -47,8 +47,8 @@ def test_our_own_run_gets_the_same_metrics(ours, reference, tmp_path):
 def as_vtu(ours, folder, moved=False):
     """A VTU file for each checkpoint, and one at rest."""
     folder.mkdir()
-    wanted = [int(np.argmin(np.abs(ours.t - t))) for t in (0.0, *SCENE.checkpoints)]
-    for number, step in enumerate(wanted):
+    steps = [int(np.argmin(np.abs(ours.t - t))) for t in (0.0, *SCENE.checkpoints)]
+    for number, step in enumerate(steps):
         x = ours.positions[step]
         data = {"displacement": x - ours.positions[0]} if moved else {}
         points = ours.positions[0] if moved else x
@@ -110,7 +110,7 @@ def test_every_form_holds_the_same_positions(ours, tmp_path, form):
     assert np.isnan(run.force).all()  # they hold none
 
 
-def test_an_entry_stands_in_tables_and_charts_beside_ours(organbench, ours, reference, results, scene_file, tmp_path):
+def test_tables_and_charts_show_an_entry_and_ours(organbench, ours, reference, results, scene_file, tmp_path):
     force = tmp_path / "force.csv"
     force.write_text(
         "t,force\n" + "\n".join(f"{float(t)!r},{float(f)!r}" for t, f in zip(ours.t, ours.force, strict=True))
@@ -198,5 +198,5 @@ def test_the_starter_of_an_export_runs_and_is_accepted_as_a_body_that_did_not_mo
     assert len([line for line in (folder / "solve.py").read_text().splitlines() if line]) <= 25
 
 
-def test_a_body_that_moved_is_not_said_to_stand_still(ours, tmp_path):
+def test_a_body_that_moved_has_no_warning_that_it_stands_still(ours, tmp_path):
     assert judged(ours.npz(tmp_path / "a.npz")).record.attributes["warnings"] == ""

@@ -48,8 +48,8 @@ POSITIONS = {
 @pytest.mark.parametrize("which", POSITIONS)
 def test_positions_that_do_not_fit_are_refused_with_the_reason(refused, ours, scene_file, tmp_path, which):
     path = ours.with_positions(tmp_path / "a.npz", wrong(ours, which))
-    told = refused("judge", scene_file, path, "--nodes", NODES, "--results", tmp_path / "none")
-    assert POSITIONS[which] in told
+    sentence = refused("judge", scene_file, path, "--nodes", NODES, "--results", tmp_path / "none")
+    assert POSITIONS[which] in sentence
     assert not (tmp_path / "none").exists()
 
 
@@ -72,10 +72,10 @@ HISTORIES = {
 
 @pytest.mark.parametrize("what", HISTORIES)
 def test_times_and_forces_that_do_not_fit_are_refused(refused, ours, scene_file, tmp_path, what):
-    change, told = HISTORIES[what]
+    change, message = HISTORIES[what]
     short = {"force": None, "pressure": None} if "positions" in change(ours) else {}
     path = ours.npz(tmp_path / "a.npz", **short | change(ours))
-    assert told in refused("judge", scene_file, path, "--nodes", NODES, "--results", tmp_path / "none")
+    assert message in refused("judge", scene_file, path, "--nodes", NODES, "--results", tmp_path / "none")
 
 
 FILES = {
@@ -95,9 +95,9 @@ FILES = {
 
 @pytest.mark.parametrize("name", FILES)
 def test_a_file_that_is_none_is_refused(refused, scene_file, tmp_path, name):
-    content, told = FILES[name]
+    content, message = FILES[name]
     (tmp_path / name).write_text(content)
-    assert told in refused("judge", scene_file, tmp_path / name, "--nodes", NODES)
+    assert message in refused("judge", scene_file, tmp_path / name, "--nodes", NODES)
     assert "there is no file" in refused("judge", scene_file, tmp_path / "none.npz")
 
 

@@ -55,28 +55,28 @@ def cut_body(mesh_cache) -> Run:
 @pytest.fixture(scope="module")
 def outsider(folder):
     """Steps of a body that is made of nothing but the exported folder; times, positions and the probed force."""
-    found = json.loads((folder / "scene.json").read_text())
+    data = json.loads((folder / "scene.json").read_text())
     mesh = meshio.read(folder / "straight.vtu")
     cells = mesh.cells_dict["tetra"].astype(np.int64)
-    material = Material(found["material"]["shear_modulus"], found["material"]["density"])
+    material = Material(data["material"]["shear_modulus"], data["material"]["density"])
     body = body_of(mesh.points, boundary_triangles(cells), cells, material)
     held = tuple(
         Attachment(
             np.flatnonzero(mesh.point_data[one["point_data"]] == 1),
             Trajectory(tuple(one["path"]["times"]), tuple(map(tuple, one["path"]["displacements"]))),
         )
-        for one in found["held"]
+        for one in data["held"]
     )
-    damping = found["damping"]["rate"]
+    damping = data["damping"]["rate"]
     limit = step_limit(body, damping, np.concatenate([one.nodes for one in held]))
-    clock = make_clock(found["duration"], found["frames"], 0.5 * limit.damped, limit)
+    clock = make_clock(data["duration"], data["frames"], 0.5 * limit.damped, limit)
     setup = Setup(body, ImplicitVolume(), clock, attachments=held, damping=damping)
-    at = [round(t / clock.frame) for t in found["checkpoints"]]
+    at = [round(t / clock.frame) for t in data["checkpoints"]]
     history = simulate(setup, at)
     assert history.outcome == "finished", history.message
     force = history.held_force[[frame - 1 for frame in at], 1, 2]
     return (
-        np.array([0.0, *found["checkpoints"]]),
+        np.array([0.0, *data["checkpoints"]]),
         np.concatenate([body.rest[None], history.snapshots]),
         np.concatenate([[0.0], force]),
     )
@@ -91,13 +91,13 @@ def test_the_exported_mesh_comes_to_the_rest_of_the_body_that_is_cut_on_the_way(
 
 
 def test_a_reader_finds_both_faces_of_the_cut(folder):
-    found = json.loads((folder / "scene.json").read_text())
-    assert found["cut"]["plane"] == {"point": [0, 0, 0], "normal": [0, 0, 1]} and found["cut"]["contact"] is False
-    assert found["cut"]["within"] == {"kind": "halfspace", "point": [0, 0, 0], "normal": [1, 0, 0]}
+    data = json.loads((folder / "scene.json").read_text())
+    assert data["cut"]["plane"] == {"point": [0, 0, 0], "normal": [0, 0, 1]} and data["cut"]["contact"] is False
+    assert data["cut"]["within"] == {"kind": "halfspace", "point": [0, 0, 0], "normal": [1, 0, 0]}
     for kind, corners in (("straight", 3), ("curved", 6)):
-        mesh = meshio.read(folder / found["meshes"][kind]["file"])
+        mesh = meshio.read(folder / data["meshes"][kind]["file"])
         (cells,) = [block.data for block in mesh.cells]
-        with (folder / found["cut"]["files"][kind]).open() as file:
+        with (folder / data["cut"]["files"][kind]).open() as file:
             rows = np.array([[int(cell) for cell in row.values()] for row in csv.DictReader(file)])
         behind, front = rows[:, :corners], rows[:, corners:]
         np.testing.assert_array_equal(mesh.points[behind], mesh.points[front])
@@ -121,14 +121,14 @@ def test_a_reader_finds_both_faces_of_the_cut(folder):
 
 
 def test_the_page_says_that_the_cut_is_there_from_the_start(folder):
-    page, found = (folder / "README.md").read_text(), json.loads((folder / "scene.json").read_text())
-    assert found["checkpoints"] == [2.0, 4.0] and "positions are judged at 2, 4 s" in page
-    for said in ("cut from the start", "cut_curved.csv", "opening_error", "piece_worst", "until t = 1 s"):
-        assert said in page
+    page, data = (folder / "README.md").read_text(), json.loads((folder / "scene.json").read_text())
+    assert data["checkpoints"] == [2.0, 4.0] and "positions are judged at 2, 4 s" in page
+    for phrase in ("cut from the start", "cut_curved.csv", "opening_error", "piece_worst", "until t = 1 s"):
+        assert phrase in page
     assert "cut_energy" not in page and "cut_ms" not in page  # of our own event
 
 
-def told_of(out: str) -> dict[str, float]:
+def printed_metrics(out: str) -> dict[str, float]:
     """The metrics that `judge` prints."""
     rows = [line.split() for line in out.splitlines() if line.startswith("  ")]
     return {name: float(value.replace("−", "-")) for name, value, *_ in rows}
@@ -141,25 +141,25 @@ def test_an_entry_is_judged_by_its_opening_too(organbench, outsider, cut_body, t
     words = ("judge", "--nodes", NODES, "--results", results, "ball_incised")
     code, out, err = organbench(*words, tmp_path / "theirs.npz")
     assert code == 0 and not err
-    told = told_of(out)
-    assert {"opening_error", "force_error", "mean_error", "overlap", "piece_worst"} <= set(told)
+    metrics = printed_metrics(out)
+    assert {"opening_error", "force_error", "mean_error", "overlap", "piece_worst"} <= set(metrics)
     (file,) = (results / "entries").glob("*.h5")
-    (beside,), problems = entries_beside(results, [BALL_INCISED], lambda scene: reference_for(results, scene))
-    assert not problems and beside.record.name == read_record(file).name
+    (run,), problems = entries_beside(results, [BALL_INCISED], lambda scene: reference_for(results, scene))
+    assert not problems and run.record.name == read_record(file).name
     # The same numbers as of the body that was cut on the way, which the whole reference judges.
     for metric in (opening_error, mean_error, force_end):
-        assert metric(beside) == pytest.approx(metric(cut_body), rel=1e-3)
-    assert told["opening_error"] == pytest.approx(opening_error(cut_body), rel=0.1)
+        assert metric(run) == pytest.approx(metric(cut_body), rel=1e-3)
+    assert metrics["opening_error"] == pytest.approx(opening_error(cut_body), rel=0.1)
     # Shut, it lacks the whole opening.
     wrong = positions.copy()
-    wrong[:, beside.cut_pairs[:, 1]] = wrong[:, beside.cut_pairs[:, 0]]
+    wrong[:, run.cut_pairs[:, 1]] = wrong[:, run.cut_pairs[:, 0]]
     np.savez(tmp_path / "wrong.npz", t=t, positions=wrong, force=2 * force)
     code, out, _ = organbench(*words, tmp_path / "wrong.npz")
-    assert told_of(out)["opening_error"] == pytest.approx(100.0, abs=0.5)
-    assert told_of(out)["force_end"] > 80.0
+    assert printed_metrics(out)["opening_error"] == pytest.approx(100.0, abs=0.5)
+    assert printed_metrics(out)["force_end"] > 80.0
 
 
-def test_a_reader_that_joins_points_is_found_out(refused, outsider, tmp_path, mesh_cache):
+def test_a_reader_that_joins_points_is_refused(refused, outsider, tmp_path, mesh_cache):
     t, positions, _ = outsider
     pairs = given_mesh(given_scene(BALL_INCISED), NODES, "straight").pairs
     kept = np.setdiff1d(np.arange(positions.shape[1]), pairs[:, 1])

@@ -86,19 +86,19 @@ def test_a_mesh_from_a_file_is_attached_where_the_region_is(tmp_path):
     scene = file_scene(write_obj(tmp_path / "box.obj", points[outer], np.searchsorted(outer, triangles)))
     mesh = mesh_for(replace(scene, held=(Held("top", top),)), 0, filled=True)
     assert len(mesh.tetrahedra)
-    found = patch_nodes(mesh, "top", top)
-    assert len(found) == 9
-    assert (mesh.points[found, 2] == 0.05).all()
+    nodes = patch_nodes(mesh, "top", top)
+    assert len(nodes) == 9
+    assert (mesh.points[nodes, 2] == 0.05).all()
 
 
 def test_a_file_may_ask_for_a_new_surface(tmp_path):
     points, faces = split(*box((-1, -1, -1), (1, 1, 1)), times=3)
     points *= 0.03 / np.linalg.norm(points, axis=1, keepdims=True)
     scene = file_scene(write_obj(tmp_path / "ball.obj", points, faces))
-    asked = dict(scene.organ.parameters)
+    parameters = dict(scene.organ.parameters)
 
     def meshed(**more):
-        return mesh_for(replace(scene, organ=replace(scene.organ, parameters=asked | more)), 150)
+        return mesh_for(replace(scene, organ=replace(scene.organ, parameters=parameters | more)), 150)
 
     assert meshed().surface_count == len(points)
     assert meshed(remesh=True).surface_count == 150
@@ -112,8 +112,8 @@ def test_dt_auto_is_the_fraction_of_the_limit_of_the_held_body():
     half, tenth = prepare(case), prepare(case.replaced(dt_fraction=0.1))
     for prepared, fraction in ((half, 0.5), (tenth, 0.1)):
         clock = prepared.setup.clock
-        wanted = fraction * prepared.limit.damped
-        assert wanted * clock.steps / (clock.steps + 1) < clock.dt <= wanted
+        most = fraction * prepared.limit.damped
+        assert most * clock.steps / (clock.steps + 1) < clock.dt <= most
     fixed = prepare(case.replaced(dt=1e-3)).setup.clock
     assert fixed.dt == pytest.approx(1e-3, rel=1e-9)
 
@@ -123,7 +123,7 @@ def test_frames_of_the_case_come_before_those_of_the_scene():
     assert prepare(tiny_case(frames=None)).setup.clock.frames == SQUEEZE.frames
 
 
-def test_a_dt_above_the_limit_is_refused_unless_it_is_wanted():
+def test_a_dt_above_the_limit_is_refused_unless_the_case_allows_it():
     limit = prepare(tiny_case()).limit.damped
     case = tiny_case(dt=2 * limit, frames=100)
     with pytest.raises(MassSpringError, match=f"above the stability limit of {limit:.3g} s; take a smaller dt"):

@@ -71,9 +71,9 @@ def test_twenty_events_end_where_one_does_and_keep_momentum_and_energy(kind):
 def test_no_stage_of_a_cut_lengthens_the_step(kind):
     """Copies are free to move apart: the highest frequency never falls (Rayleigh)."""
     setup = prepared(advancing(BALL_INCISED), kind).setup
-    found = [step_limit(body).frequency for body in (setup.body, *(event.body for event in setup.events))]
-    assert len(found) > 8
-    assert all(after >= before * (1 - 1e-6) for before, after in itertools.pairwise(found))
+    frequencies = [step_limit(body).frequency for body in (setup.body, *(event.body for event in setup.events))]
+    assert len(frequencies) > 8
+    assert all(after >= before * (1 - 1e-6) for before, after in itertools.pairwise(frequencies))
 
 
 @pytest.mark.slow

@@ -83,14 +83,14 @@ def test_names_are_readable_and_distinct_within_a_study():
 
 
 @pytest.mark.parametrize(
-    ("method", "precision", "told"),
+    ("method", "precision", "message"),
     [
         (Free(), "float16", "unknown precision 'float16'; choose float64 or float32"),
         (Penalty(), "float32", "method 'penalty' runs in float64 only, its claims are measured in float64; leave"),
     ],
 )
-def test_a_precision_that_the_method_does_not_claim_is_refused(method, precision, told):
-    with pytest.raises(StudyError, match=told):
+def test_a_precision_that_the_method_does_not_claim_is_refused(method, precision, message):
+    with pytest.raises(StudyError, match=message):
         Case(SCENES[0], method=method, precision=precision)
 
 
@@ -115,7 +115,7 @@ def test_grading_and_masses_stand_in_names_and_series():
 
 
 @pytest.mark.parametrize(
-    ("recipe", "told"),
+    ("recipe", "message"),
     [
         ({"kind": "surface", "graded": True}, "a surface body cannot be graded; choose kind 'tetrahedral' or"),
         ({"kind": "membrane", "law": "delingette", "graded": True}, "a membrane body cannot be graded"),
@@ -125,8 +125,8 @@ def test_grading_and_masses_stand_in_names_and_series():
         ({"kind": "quadratic", "law": "uniform"}, "follow no law, not 'uniform' either; leave the law out"),
     ],
 )
-def test_settings_of_a_body_that_do_not_go_together_are_refused(recipe, told):
-    with pytest.raises(StudyError, match=told):
+def test_settings_of_a_body_that_do_not_go_together_are_refused(recipe, message):
+    with pytest.raises(StudyError, match=message):
         BodyRecipe(**recipe)
 
 

@@ -1,4 +1,4 @@
-"""What tells that an answer should not be believed, on histories and bodies whose numbers are known."""
+"""What tells that an answer should not be believed, on histories and bodies with exact numbers."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -59,8 +59,8 @@ def test_neighbours_share_an_element():
     points, triangles, cells = block((2, 1, 1))
     edges = {tuple(sorted(cell[[i, j]])) for cell in cells for i in range(4) for j in range(i)}
     body = tetrahedral_body(points, triangles, cells, SOFT, "cotangent")
-    found = neighbours(Volumes.nodal(body), -1)
-    assert {tuple(pair) for pair in found} >= edges
+    pairs = neighbours(Volumes.nodal(body), -1)
+    assert {tuple(pair) for pair in pairs} >= edges
     quadratic = quadratic_body(*quadratic_block((2, 1, 1)), SOFT)
     assert len(neighbours(quadratic.kept, -1)) == len(edges)
     assert not (neighbours(quadratic.kept, 3) == 3).any()
@@ -80,10 +80,10 @@ def test_a_checkerboard_counts_and_a_gradient_does_not():
     ("changed", "word"),
     [({"unknowns_per_volume": 0.6}, "locks"), ({"alternation": 0.6}, "alternate"), ({"sway": 2 * SWAYS}, "oscillates")],
 )
-def test_each_indicator_is_told_beyond_its_bound(changed, word):
+def test_each_indicator_has_a_remark_beyond_its_bound(changed, word):
     assert remarks(GOOD) == [] and remarks(dict.fromkeys(GOOD, np.nan)) == []
-    (said,) = remarks(GOOD | changed)
-    assert word in said
+    (remark,) = remarks(GOOD | changed)
+    assert word in remark
 
 
 def test_a_record_has_them(mesh_cache):

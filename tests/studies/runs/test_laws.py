@@ -49,7 +49,7 @@ def test_an_unknown_law_is_refused_with_the_nearest():
         BodyRecipe(law="van_geldr")
 
 
-def test_every_law_of_the_solver_can_be_asked_for():
+def test_every_law_of_the_solver_is_a_law_of_a_recipe():
     for law in (*(law.name for law in LAWS), *MEMBRANE_LAWS):
         assert BodyRecipe(law=law).law == law
 

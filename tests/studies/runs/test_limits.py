@@ -10,7 +10,7 @@ from tests.studies.tiny import SQUEEZE, tiny_case
 
 
 @pytest.mark.parametrize(
-    ("changes", "told"),
+    ("changes", "message"),
     [
         ({"dt": 1e-12}, "dt = 1e-12 s makes 4e+12 steps; at most 1e+08 are run: give dt near the limit of 0.0"),
         ({"dt_fraction": 1e-9}, "steps; at most 1e+08 are run: give dt near the limit of"),
@@ -23,10 +23,10 @@ from tests.studies.tiny import SQUEEZE, tiny_case
     ],
     ids=lambda value: "",
 )
-def test_what_cannot_be_computed_is_refused_at_once(mesh_cache, changes, told):
+def test_what_cannot_be_computed_is_refused_at_once(mesh_cache, changes, message):
     record = measure(tiny_case(**changes))
     assert record.status == Status.FAILED
-    assert told in record.message
+    assert message in record.message
     assert "\n" not in record.message
 
 

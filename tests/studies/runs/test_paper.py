@@ -81,6 +81,6 @@ def test_the_curves_are_the_volumes(balls, tmp_path):
 
 def test_the_squeezed_balls_say_what_they_lost(balls):
     figure = paper_ball.squeezed_figure(balls)
-    said = "\n".join(text.get_text() for axes in figure.axes for text in axes.texts)
-    assert f"{paper_ball.change(balls['free'])[-1]:+.1f} %".replace("-", "−") in said
-    assert "volume kept within" in said
+    labels = "\n".join(text.get_text() for axes in figure.axes for text in axes.texts)
+    assert f"{paper_ball.change(balls['free'])[-1]:+.1f} %".replace("-", "−") in labels
+    assert "volume kept within" in labels

@@ -29,7 +29,7 @@ def test_a_method_comes_back_with_its_settings(method):
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    ("text", "message"),
     [
         ("", "is not a recipe of a case"),
         ("[1]", "must be a JSON object"),
@@ -38,6 +38,6 @@ def test_a_method_comes_back_with_its_settings(method):
         ('{"body": {"kind": "cubic"}}', "the text is not a stored case"),
     ],
 )
-def test_what_is_no_recipe_is_one_sentence(text, said):
-    with pytest.raises(StudyError, match=said):
+def test_what_is_no_recipe_is_one_sentence(text, message):
+    with pytest.raises(StudyError, match=message):
         case_of_recipe(LIVER_PRESS, text)

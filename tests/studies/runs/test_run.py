@@ -117,10 +117,10 @@ def test_it_is_current_until_case_or_code_change(ran, monkeypatch):
     assert why_stale(root, tiny_case())
 
 
-def test_progress_is_told_frame_by_frame():
-    told = []
-    measure(tiny_case(), told.append)
-    assert told == list(range(1, FRAMES + 1))
+def test_progress_counts_frame_by_frame():
+    frames = []
+    measure(tiny_case(), frames.append)
+    assert frames == list(range(1, FRAMES + 1))
 
 
 def test_a_step_beyond_the_limit_diverges_and_says_so():

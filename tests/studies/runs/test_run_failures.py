@@ -86,8 +86,8 @@ def test_millimetres_read_as_metres_warn_with_the_box(tmp_path):
     points, triangles = box()
     path = write_obj(tmp_path / "organ.obj", 1000 * points, triangles)
     case = tiny_case(scene=file_scene(path), body=BodyRecipe("surface"))
-    said = measure(case).attributes["warnings"]
-    assert re.search(r"organ\.obj: the bounding box is 100 x 100 x 100 m; .* unit='mm'", said)
+    warning = measure(case).attributes["warnings"]
+    assert re.search(r"organ\.obj: the bounding box is 100 x 100 x 100 m; .* unit='mm'", warning)
     right = tiny_case(scene=file_scene(path, unit="mm"), body=BodyRecipe("surface"))
     record = measure(right)
     assert (record.status, record.attributes["warnings"]) == (Status.OK, "")

@@ -26,30 +26,30 @@ def recipe_for(method):
 
 @pytest.mark.parametrize("method", [m for m in METHODS if m not in UNLIMITED], ids=lambda method: method.name)
 def test_below_holds_and_above_breaks(method):
-    found = safe_step(Case(SHORT, recipe_for(method), method()))
+    step = safe_step(Case(SHORT, recipe_for(method), method()))
     if method is XpbdNeoHookean:  # its springs are replaced by constraints: nothing tried broke it
-        assert {status for _, status in found.tried} == {Status.OK} and found.tried[-1][0] > 2 * found.limit.damped
+        assert {status for _, status in step.tried} == {Status.OK} and step.tried[-1][0] > 2 * step.limit.damped
         return
     if method is Xpbd:
         # The volumes of all cells take the stiffest modes away: the limit is longer than that of the springs.
-        assert found.bracket is not None and found.limit.damped < found.bracket[1] and found.tried[0][1] == Status.OK
+        assert step.bracket is not None and step.limit.damped < step.bracket[1] and step.tried[0][1] == Status.OK
         return
-    assert found.verified
-    (below, calm), (above, wild) = found.tried
+    assert step.verified
+    (below, calm), (above, wild) = step.tried
     # Rounding to whole steps, a hundred to a frame, moves the step by 1 % at most, and never up.
-    assert 0.99 * BELOW <= below / found.limit.damped <= BELOW * (1 + 1e-9)
-    assert 0.99 * ABOVE <= above / found.limit.damped <= ABOVE * (1 + 1e-9)
+    assert 0.99 * BELOW <= below / step.limit.damped <= BELOW * (1 + 1e-9)
+    assert 0.99 * ABOVE <= above / step.limit.damped <= ABOVE * (1 + 1e-9)
     assert (calm, wild) == (Status.OK, Status.DIVERGED)
-    assert found.auto <= 0.5 * found.limit.damped
+    assert step.auto <= 0.5 * step.limit.damped
 
 
 @pytest.mark.parametrize("method", UNLIMITED, ids=lambda method: method.name)
 def test_a_method_without_a_limit_says_so(method):
-    """Twenty times the explicit limit, and the run holds; a claim that fails is found out."""
-    found = safe_step(Case(SHORT, recipe_for(method), method()))
-    assert found.verified and "no stability limit" in found.verdict and "accuracy" in found.verdict
-    assert found.tried[-1][0] > 15 * found.limit.damped
-    assert not replace(found, tried=((0.1, Status.DIVERGED),)).verified
+    """Twenty times the explicit limit, and the run holds; a claim that fails is not verified."""
+    step = safe_step(Case(SHORT, recipe_for(method), method()))
+    assert step.verified and "no stability limit" in step.verdict and "accuracy" in step.verdict
+    assert step.tried[-1][0] > 15 * step.limit.damped
+    assert not replace(step, tried=((0.1, Status.DIVERGED),)).verified
 
 
 def test_stiffer_means_shorter():
@@ -72,18 +72,18 @@ def test_what_counts_as_verified(below, above, verified):
 
 
 @pytest.mark.parametrize("wrong", [0.5, 1.5])
-def test_a_wrong_prediction_is_found_out_and_the_limit_found_all_the_same(monkeypatch, wrong):
+def test_a_wrong_prediction_is_not_verified_and_the_bracket_holds_the_true_limit(monkeypatch, wrong):
     """Mutants that predict half the limit, or one and a half of it: the bracket is where the true one is."""
     right = prepare(Case(SHORT, BodyRecipe("tetrahedral", 60))).limit
 
     def mutant(case):
-        found = prepare(case)
-        return replace(found, limit=StepLimit(found.limit.frequency / wrong, found.limit.damping))
+        preparation = prepare(case)
+        return replace(preparation, limit=StepLimit(preparation.limit.frequency / wrong, preparation.limit.damping))
 
     monkeypatch.setattr(module, "prepare", mutant)
-    found = safe_step(Case(SHORT, BodyRecipe("tetrahedral", 60)))
-    assert not found.verified and ("longer" if wrong < 1 else "shorter") in found.verdict
-    below, above = found.bracket
+    step = safe_step(Case(SHORT, BodyRecipe("tetrahedral", 60)))
+    assert not step.verified and ("longer" if wrong < 1 else "shorter") in step.verdict
+    below, above = step.bracket
     assert below < right.damped < above
     # One run to the next is a factor of 1.25, or 1.1/0.95 in the middle; whole steps take up to 1 %.
     assert above / below < 1.27
@@ -92,10 +92,10 @@ def test_a_wrong_prediction_is_found_out_and_the_limit_found_all_the_same(monkey
 @pytest.mark.parametrize("volumes", ["whole", "regions", "nodal"])
 def test_constraints_never_shorten_the_limit(volumes):
     """Cauchy interlacing: volumes take modes away. A few leave the stiffest mode as it is, one per node does not."""
-    found = safe_step(Case(SHORT, BodyRecipe("tetrahedral", 60, volumes=volumes, regions=4)))
-    assert found.bracket[1] > found.limit.damped
-    assert found.verified == (volumes != "nodal")
-    assert ("longer than predicted" in found.verdict) == (not found.verified)
+    step = safe_step(Case(SHORT, BodyRecipe("tetrahedral", 60, volumes=volumes, regions=4)))
+    assert step.bracket[1] > step.limit.damped
+    assert step.verified == (volumes != "nodal")
+    assert ("longer than predicted" in step.verdict) == (not step.verified)
 
 
 def test_a_limit_that_no_run_shows_has_no_bracket():
@@ -104,6 +104,6 @@ def test_a_limit_that_no_run_shows_has_no_bracket():
     assert calm.margin == pytest.approx(2.0)
 
 
-def test_what_cannot_be_prepared_is_told():
+def test_what_cannot_be_prepared_is_one_sentence():
     with pytest.raises(StudyError, match="stiffness factor is -1"):
         safe_step(tiny_case(body=BodyRecipe(nodes=60, stiffness=-1.0)))

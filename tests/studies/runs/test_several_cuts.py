@@ -82,7 +82,7 @@ def test_page_and_view_compare_each_side_of_a_cut_with_its_own_side_of_the_refer
     step = 1e-4 * RADIUS * np.array(UP)
     truth = [run.reference.displacements(run.fields.rest[behind] + sign * step)[-1] for sign in (-1, 1)]
     wide = np.linalg.norm(truth[1] - truth[0], axis=1)
-    assert wide.max() > 0.05 * RADIUS  # asked at the cut itself, one of the sides would be wrong by this
+    assert wide.max() > 0.05 * RADIUS  # taken at the cut itself, one of the sides would be wrong by this
     moved = run.fields.snapshots[-1] - run.fields.rest
     wrong = [np.linalg.norm(moved[side] - of, axis=1) for side, of in zip((behind, front), truth, strict=True)]
     shown = shown_run(run, run.reference, "quadratic")
@@ -126,14 +126,14 @@ def test_the_reference_opens_one_cut_after_the_other(judged):
     assert gapes[0].max() == gapes[1, 1] == 0.0
 
     mesh = base_mesh(replace(BALL_CUT_TWICE, checkpoints=(SECOND_AT, 4.0)), 150, 0)
-    found = path_of(mesh, problems_of(mesh))
+    path = path_of(mesh, problems_of(mesh))
     opened, parent = opened_elements(mesh.mesh, mesh.body.faces_of_cuts[0])
     (truth,) = equilibrium_path(problem_on(mesh.scene, opened, mesh.held_in(parent), None), (SECOND_AT,))[-1:]
-    assert found[0].held_force == pytest.approx(truth.held_force, rel=1e-9, abs=1e-9)
+    assert path[0].held_force == pytest.approx(truth.held_force, rel=1e-9, abs=1e-9)
     where = {tuple(place): u for place, u in zip(nodes(opened), truth.u, strict=True)}
     single = [k for k, place in enumerate(nodes(mesh.solved)) if abs(abs(place[2]) - AWAY * RADIUS) > 1e-9]
     moved = np.array([where[tuple(nodes(mesh.solved)[k])] for k in single])
-    assert np.abs(found[0].u[single] - moved).max() < 1e-9 * RADIUS
+    assert np.abs(path[0].u[single] - moved).max() < 1e-9 * RADIUS
 
 
 def mirrored() -> OrganMesh:

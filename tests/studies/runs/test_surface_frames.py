@@ -1,4 +1,4 @@
-"""A recorded surface is where the run was: at the same steps, from the start to the end, and only where asked."""
+"""A recorded surface is where the run was, at the same steps, from start to end; other cases record none."""
 
 from dataclasses import replace
 
@@ -75,16 +75,16 @@ def test_it_replays_and_its_case_survives_json(stored):
 
 def test_timed_runs_keep_no_surface(tmp_path, monkeypatch):
     """A run that is timed keeps no positions, whatever its case records."""
-    asked = []
+    requests = []
 
     def watched(setup, snapshots=(), **options):
-        asked.append(tuple(snapshots))
+        requests.append(tuple(snapshots))
         return simulate(setup, snapshots, **options)
 
     monkeypatch.setattr("studies.metrics.timing.cases.simulate", watched)
     monkeypatch.setattr("studies.metrics.timing.cases.BUDGET", 0.0)
     time_cases(tmp_path, "tiny", [tiny_case(recorded=("surface",), timed=True)], lambda name: None)
-    assert len(asked) >= 2 and set(asked) == {()}
+    assert len(requests) >= 2 and set(requests) == {()}
 
 
 def test_an_early_end_is_the_last_frame_and_a_start_of_its_own_the_first():
@@ -115,10 +115,10 @@ def test_moments_are_few_and_never_before_the_first_frame():
 
 def test_main_studies_can_be_replayed():
     """Each main study that judges accuracy has cases to look at, and the results grow by 10 MB at most."""
-    asked = [case for study in STUDIES if study.main for case in study.cases if case.recorded == ("surface",)]
-    assert {case.scene.name for case in asked} == {"ball_squeeze", "liver_press", "liver_probe", "ball_clamped"}
-    assert {case.body.kind for case in asked} == {"tetrahedral", "surface", "quadratic"}
-    assert sum(12 * case.body.nodes * (MOMENTS + 8) for case in asked) <= 10e6
+    recorded = [case for study in STUDIES if study.main for case in study.cases if case.recorded == ("surface",)]
+    assert {case.scene.name for case in recorded} == {"ball_squeeze", "liver_press", "liver_probe", "ball_clamped"}
+    assert {case.body.kind for case in recorded} == {"tetrahedral", "surface", "quadratic"}
+    assert sum(12 * case.body.nodes * (MOMENTS + 8) for case in recorded) <= 10e6
 
 
 def test_the_same_run_with_and_without_its_surface_is_seen_once(stored, tmp_path):

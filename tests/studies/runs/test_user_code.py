@@ -86,9 +86,9 @@ EDITS = {
 
 @pytest.mark.parametrize("what", EDITS)
 def test_an_edit_makes_stale_what_uses_the_file(organbench, mine, ran, what):
-    before, after, found = EDITS[what]
+    before, after, counts = EDITS[what]
     edit(mine, before, after)
-    assert organbench("status", mine, "--results", ran)[1].startswith(f"calm: 3 cases: {found}\n")
+    assert organbench("status", mine, "--results", ran)[1].startswith(f"calm: 3 cases: {counts}\n")
 
 
 def test_an_edit_of_a_module_beside_it_does_too(mine):
@@ -136,11 +136,11 @@ def test_replay_runs_the_file_that_the_user_names(organbench, refused, mine, ran
     user_code.forget()
     assert "the same, bit for bit" in organbench("replay", record, "--file", moved)[1]
     edit(moved, "1.0 / edges.length,", "1.0 / edges.length**2,")
-    told = f"{moved} is not the file that {record} was made with: its content has changed"
-    assert told in refused("replay", record, "--file", moved)
+    message = f"{moved} is not the file that {record} was made with: its content has changed"
+    assert message in refused("replay", record, "--file", moved)
     code, out, err = organbench("replay", record, "--file", moved, "--changed")
     assert code == 1 and "differs by up to" in out and "the code has changed since it was stored" in out
-    assert f"warning: {told}" in err
+    assert f"warning: {message}" in err
 
 
 def test_a_view_needs_no_file(organbench, mine, ran, tmp_path):
@@ -162,11 +162,11 @@ NAMES = {
 
 @pytest.mark.parametrize("what", NAMES)
 def test_a_name_that_is_taken_is_refused(refused, mine, tmp_path, what):
-    before, after, told = NAMES[what]
+    before, after, message = NAMES[what]
     edit(mine, before, after)
     if what == "law":
         edit(mine, "StiffnessLaw(bars)", "StiffnessLaw(uniform)")
-    assert told in refused("run", mine, "--results", tmp_path / "none")
+    assert message in refused("run", mine, "--results", tmp_path / "none")
 
 
 def test_two_files_with_one_name_are_refused(refused, mine, tmp_path):
@@ -186,10 +186,10 @@ FAULTS = {
 @pytest.mark.parametrize("what", FAULTS)
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")
 def test_a_fault_in_it_is_a_result_with_its_line(mine, what):
-    before, after, case, told = FAULTS[what]
+    before, after, case, message = FAULTS[what]
     edit(mine, before, after)
     record = measure(find_study(str(mine)).cases[case])
-    assert record.status == Status.FAILED and told in record.message and str(mine) in record.attributes["own_files"]
+    assert record.status == Status.FAILED and message in record.message and str(mine) in record.attributes["own_files"]
 
 
 def test_a_worker_runs_what_this_process_has_read(mine):

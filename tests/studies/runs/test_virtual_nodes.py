@@ -33,9 +33,9 @@ def test_an_incision_that_ends_inside_cells_gapes_as_in_the_reference(tmp_path):
     run = run_of(BALL_INCISED, ONE, tmp_path)
     assert run.record.status == "ok", run.record.message
     truth = run.reference.opening(run.fields.rest[run.cut_pairs[:, 0]])
-    gap, wanted = (run.cut_weights @ u[:, 2] for u in (run.opening, truth))
+    gap, true_gap = (run.cut_weights @ u[:, 2] for u in (run.opening, truth))
     # Where only cells that are cut through are copied, the front stands too early: an error of 27 %.
-    assert gap / wanted == pytest.approx(1.0, abs=0.1)
+    assert gap / true_gap == pytest.approx(1.0, abs=0.1)
     assert METRIC["opening_error"](run) < 12.0
     assert METRIC["mean_error"](run) < 5.0
     assert abs(METRIC["force_end"](run)) < 12.0

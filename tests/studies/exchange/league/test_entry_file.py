@@ -57,8 +57,8 @@ def test_an_entry_is_judged_and_becomes_a_row(organbench, entry, tmp_path):
     code, out, _ = organbench("judge", "ball_squeeze", entry(), "--results", tmp_path / "results")
     assert code == 0 and "volume_worst" in out
     (file,) = (tmp_path / "results" / "league" / "entries").glob("*.h5")
-    told = EntryFile.model_validate_json(str(read_record(file).attributes[LEAGUE]))
-    assert (told.engine, told.version, told.command, told.ours) == ("mine", "1.2", "mine ball_squeeze", False)
+    header = EntryFile.model_validate_json(str(read_record(file).attributes[LEAGUE]))
+    assert (header.engine, header.version, header.command, header.ours) == ("mine", "1.2", "mine ball_squeeze", False)
     (row,), problems = league_rows(tmp_path / "results")
     assert not problems and row["engine"] == "mine" and row["scene"] == "ball_squeeze"
     assert row["volume_worst [%]"] == pytest.approx(10.0)
@@ -67,9 +67,9 @@ def test_an_entry_is_judged_and_becomes_a_row(organbench, entry, tmp_path):
 
 
 def test_an_entry_that_replaces_another_one_says_so(organbench, entry, tmp_path):
-    for version, told in (("1", False), ("2", True)):
+    for version, replaces in (("1", False), ("2", True)):
         code, _, err = organbench("judge", "ball_squeeze", entry(version=version), "--results", tmp_path / "results")
-        assert code == 0 and ("it replaces an entry named mine on the same mesh" in err) == told
+        assert code == 0 and ("it replaces an entry named mine on the same mesh" in err) == replaces
 
 
 REFUSED = {
@@ -93,15 +93,15 @@ REFUSED = {
 
 @pytest.mark.parametrize("what", REFUSED)
 def test_what_does_not_fit_the_set_is_refused(refused, entry, tmp_path, what):
-    changes, told = REFUSED[what]
-    assert told in refused("judge", "ball_squeeze", entry(**changes), "--results", tmp_path / "none")
+    changes, message = REFUSED[what]
+    assert message in refused("judge", "ball_squeeze", entry(**changes), "--results", tmp_path / "none")
     assert not (tmp_path / "none").exists()
 
 
 @pytest.mark.parametrize("name", [name for name, one in frozen().items() if one.held_back])
 def test_a_scene_that_is_held_back_is_refused(refused, entry, name):
-    told = refused("judge", name, entry(scene=name))
-    assert f"{name} of {SET} is held back: nobody can enter it before its data is published" in told
+    sentence = refused("judge", name, entry(scene=name))
+    assert f"{name} of {SET} is held back: nobody can enter it before its data is published" in sentence
 
 
 def test_a_scene_outside_of_the_set_is_refused(refused, entry):
@@ -149,5 +149,5 @@ def test_the_league_is_published_from_its_entries_alone(organbench, refused, ent
     assert (published / "league" / "sweep.csv").read_text() == "old"  # its own command makes it
     assert set(noted(published)) == {"league"}
     monkeypatch.setattr(publish, "fingerprints", set)
-    told = refused("publish", "league", "--results", results)
-    assert "0 more entries were judged by other code; run `make study-league`" in told
+    sentence = refused("publish", "league", "--results", results)
+    assert "0 more entries were judged by other code; run `make study-league`" in sentence

@@ -46,8 +46,8 @@ def test_what_is_held_back_is_not_in_the_set():
 
 @pytest.mark.parametrize("scene", [one for one in SCENES if one.name in OPEN], ids=lambda one: one.name)
 def test_open_scenes_are_judged_by_the_references_that_the_set_names(scene: Scene):
-    known = published(scene)
-    assert known is not None and known.sha256 == OPEN[scene.name].reference
+    reference = published(scene)
+    assert reference is not None and reference.sha256 == OPEN[scene.name].reference
     assert physics(scene) == OPEN[scene.name].physics
 
 

@@ -51,8 +51,8 @@ def ended(solved, tmp_path_factory, mesh_cache):
 @pytest.mark.parametrize("name", ENDS)
 def test_each_end_is_a_row_that_says_so(ended, name):
     record = ended[1][name]
-    status, told = ENDS[name]
-    assert record.status == status and told in record.message
+    status, message = ENDS[name]
+    assert record.status == status and message in record.message
 
 
 def test_tables_show_them_all(ended, reference):
@@ -96,11 +96,11 @@ REFUSED = {
 
 @pytest.mark.parametrize("what", REFUSED)
 def test_a_scene_beyond_the_adapters_is_refused_with_its_reason(tmp_path, mesh_cache, what):
-    scene, told = REFUSED[what]
+    scene, message = REFUSED[what]
     nodes = 400 if scene.lumen else NODES + 50
     export(scene, tmp_path / "scene", nodes)
     given = SceneFolder(tmp_path / "scene")
-    with pytest.raises(CannotDo, match=told):
+    with pytest.raises(CannotDo, match=message):
         given.check_simple()
         given.obstacles("plane")
 
@@ -160,7 +160,7 @@ def test_each_program_squeezes_the_ball(reference, tmp_path, mesh_cache, peer):
 
 
 def test_an_environment_that_cannot_be_made_is_a_reason(tmp_path, mesh_cache):
-    """pip is asked for a package that no index can have; the row says so, and the rest would go on."""
+    """pip gets a package that no index can have; the row says so, and the rest would go on."""
     peer = Peer("nowhere", "tests.studies.exchange.peers.dummy_unable", packages=("./not-a-folder-of-any-package",))
     attempt = Attempt(peer, replace(SCENE, reference=None), NODES)
     (record,) = contest(tmp_path / "r", [attempt], tmp_path / "g", environments=tmp_path / "e")
@@ -170,20 +170,20 @@ def test_an_environment_that_cannot_be_made_is_a_reason(tmp_path, mesh_cache):
 
 def test_what_is_current_is_kept_and_what_was_skipped_is_tried_again(ended, monkeypatch):
     root, records = ended
-    asked = []
-    monkeypatch.setattr(peers, "hand_over", lambda attempt, *_: asked.append(attempt.name) or (Status.SKIPPED, "later"))
+    calls = []
+    monkeypatch.setattr(peers, "hand_over", lambda attempt, *_: calls.append(attempt.name) or (Status.SKIPPED, "later"))
     attempts = [Attempt(dummy(name), SCENE, NODES) for name in ("squeezed", "crashed", "unable")]
     kept, crashed, skipped = contest(root, attempts, root / "given")
-    assert asked == ["unable"] and skipped.message == "later"
+    assert calls == ["unable"] and skipped.message == "later"
     assert (kept.status, crashed.message) == (Status.OK, records["crashed"].message)
     # Other settings, and other code of the adapter, run again.
     other = replace(dummy("squeezed"), settings={"step": 1})
     assert next(contest(root, [Attempt(other, SCENE, NODES)], root / "given")).message == "later"
     monkeypatch.setattr(peers, "fingerprint_of", lambda peer: "other code")
     next(contest(root, [Attempt(dummy("crashed"), SCENE, NODES)], root / "given"))
-    assert asked == ["unable", "squeezed", "crashed"]
+    assert calls == ["unable", "squeezed", "crashed"]
 
 
-def test_entries_of_the_present_code_are_known_by_their_fingerprint(ended):
+def test_entries_of_the_present_code_carry_its_fingerprint(ended):
     assert fingerprint_of(PEERS[0]) in fingerprints() and len(fingerprints()) > len(OURS)
     assert ended[1]["squeezed"].fingerprint == fingerprint_of(dummy("squeezed"))

@@ -74,10 +74,10 @@ def test_a_cube_between_two_plates_answers_with_its_modulus(tmp_path, name):
     command = [python, "-m", "studies.exchange.peers.run", *words, json.dumps(SETTINGS[name])]
     ended = subprocess.run(command, env=environment, capture_output=True, text=True, cwd=tmp_path)
     assert ended.returncode == 0, ended.stderr[-500:]
-    found, strain = np.load(tmp_path / "out.npz"), PRESSED / SIDE
-    assert found["positions"][-1] == pytest.approx(CORNERS - [0, 0, PRESSED] * (CORNERS[:, 2:] > 0), abs=2e-6)
-    assert found["force"][-1] == pytest.approx((LAME + 2.0 * MU) * strain * SIDE**2, rel=0.03)
-    assert found["force"][0] == 0.0
+    entry, strain = np.load(tmp_path / "out.npz"), PRESSED / SIDE
+    assert entry["positions"][-1] == pytest.approx(CORNERS - [0, 0, PRESSED] * (CORNERS[:, 2:] > 0), abs=2e-6)
+    assert entry["force"][-1] == pytest.approx((LAME + 2.0 * MU) * strain * SIDE**2, rel=0.03)
+    assert entry["force"][0] == 0.0
 
 
 @pytest.mark.slow
@@ -97,8 +97,8 @@ def test_held_nodes_go_their_way(tmp_path, mesh_cache):
     parts = [given.marked(f"held_{region.name}") for region in BALL_CLAMPED.held]
     assert given.probed_obstacle is None and list(given.probed_nodes) == list(parts[BALL_CLAMPED.probed.number])
     for t in (0.0, 1.1, 3.0, 4.0):
-        wanted = [given.points[nodes] + one.path(t) for nodes, one in zip(parts, BALL_CLAMPED.held, strict=True)]
-        assert given.held_at(t) == pytest.approx(np.concatenate(wanted), abs=1e-15)
+        places = [given.points[nodes] + one.path(t) for nodes, one in zip(parts, BALL_CLAMPED.held, strict=True)]
+        assert given.held_at(t) == pytest.approx(np.concatenate(places), abs=1e-15)
     assert list(given.held) == list(np.concatenate(parts))
     assert given.along(np.array([1.0, 2.0, -3.0])) == pytest.approx(3.0)
 

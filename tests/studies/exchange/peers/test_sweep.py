@@ -1,4 +1,4 @@
-"""The settings of programs are those that the published sweep found to be best."""
+"""The settings of programs are the best ones of the published sweep."""
 
 import json
 from pathlib import Path
@@ -61,9 +61,9 @@ def test_each_keyword_is_varied_from_the_best_so_far(monkeypatch):
 def test_lost_volume_counts_as_much_as_force_and_displacement(monkeypatch, force, displacement, volume, share):
     """Else a tissue that gives way would be the best setting of coarse tetrahedra. A ball without holds has no
     displacement to judge."""
-    found = SimpleNamespace(force=Measured(force), displacement=Measured(displacement), cost=Measured(1.0))
+    errors = SimpleNamespace(force=Measured(force), displacement=Measured(displacement), cost=Measured(1.0))
     monkeypatch.setattr(sweep, "run_of_entry", lambda *_: "run")
-    monkeypatch.setattr(sweep, "judged_run", lambda run: found)
+    monkeypatch.setattr(sweep, "judged_run", lambda run: errors)
     monkeypatch.setattr(sweep, "VOLUME", lambda run: volume)
     assert sweep._numbers(SimpleNamespace(status=Status.OK, message=""), LIVER_PRESS)[SHARE] == pytest.approx(share)
 
