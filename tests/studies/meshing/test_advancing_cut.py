@@ -118,13 +118,13 @@ def test_random_sections_open_without_meeting_themselves(seed, inner):
 def test_without_waiting_some_surfaces_would_meet_themselves(monkeypatch):
     """So the tests above can fail."""
     monkeypatch.setattr(advancing_cut, "meetings", lambda faces, parting, passed: np.zeros(len(passed), dtype=bool))
-    found = set()
+    faults = set()
     for seed in MEETING:
         cells, faces, along = disc(seed)
         n = len(along)
         stages = faces_in_stages(faces, parting_nodes(cells, faces, n), along, MANY)
-        found |= {wrong(cells, faces[stage], n) for stage in stages}
-    assert {"an edge has more than two triangles", "a node has two fans"} <= found
+        faults |= {wrong(cells, faces[stage], n) for stage in stages}
+    assert {"an edge has more than two triangles", "a node has two fans"} <= faults
 
 
 def test_a_front_passes_several_nodes_at_once_or_none():

@@ -26,7 +26,7 @@ def test_what_folds_nowhere_stays_as_it_is():
     assert side.volume == pytest.approx(made.volume, rel=1e-12)
 
 
-def test_a_side_that_folds_its_element_is_held_back_and_told(monkeypatch):
+def test_a_side_that_folds_its_element_is_held_back_with_a_warning(monkeypatch):
     mesh = ball(60)
     smooth = curved(mesh)
     facet = boundary_facets(mesh, smooth.cells)[0]

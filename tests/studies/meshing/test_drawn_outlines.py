@@ -16,14 +16,14 @@ LEVEL = 149
 
 def rim_of(mesh):
     """Vertices on the outlines of the patches: on sides of one facet only."""
-    found = []
+    vertices = []
     for patch in mesh.patches.values():
         corners = mesh.facets[np.isin(mesh.facets[:, :3], patch).all(axis=1)][:, :3]
         sides, count = np.unique(
             np.sort(corners[:, [[0, 1], [1, 2], [0, 2]]].reshape(-1, 2), axis=1), axis=0, return_counts=True
         )
-        found.append(sides[count == 1].ravel())
-    return np.concatenate(found)
+        vertices.append(sides[count == 1].ravel())
+    return np.concatenate(vertices)
 
 
 def test_middles_of_sides_that_leave_an_outline_are_drawn_to_it(monkeypatch, mesh_cache):
@@ -41,18 +41,18 @@ def test_middles_of_sides_that_leave_an_outline_are_drawn_to_it(monkeypatch, mes
     near, far = (plain.points[ends[leaving][chosen[leaving]]] for chosen in (on, ~on))
     middle = middles[leaving]
     # The parabola through the three nodes of a side, at 0.4.
-    wanted = 0.12 * near - 0.08 * far + 0.96 * plain.points[middle]
-    there = np.linalg.norm(drawn.points[middle] - wanted, axis=1) < 1e-9
+    places = 0.12 * near - 0.08 * far + 0.96 * plain.points[middle]
+    there = np.linalg.norm(drawn.points[middle] - places, axis=1) < 1e-9
     assert there.mean() > 0.9  # a few are held back, lest elements fold
     assert drawn.smallest_jacobian > 0
 
 
 @pytest.mark.parametrize(
-    ("scene", "wanted"), [(BALL_CLAMPED, 0.4), (LIVER_PROBE, 0.4), (SPLEEN_SAG, 0.45), (BALL_SQUEEZE, 0.5)]
+    ("scene", "share"), [(BALL_CLAMPED, 0.4), (LIVER_PROBE, 0.4), (SPLEEN_SAG, 0.45), (BALL_SQUEEZE, 0.5)]
 )
-def test_what_its_weight_bends_is_drawn_less(scene, wanted):
+def test_what_its_weight_bends_is_drawn_less(scene, share):
     """Its strains at the outline are not small. What is not held has no outline."""
-    assert middles(scene) == wanted
+    assert middles(scene) == share
 
 
 def test_a_body_that_nothing_holds_is_graded_too(mesh_cache):

@@ -19,7 +19,7 @@ def held_nodes(prepared):
     return [attachment.nodes for attachment in prepared.setup.attachments]
 
 
-def test_a_graded_body_holds_the_nodes_of_its_caps_and_has_the_surface_nodes_asked_for(mesh_cache):
+def test_a_graded_body_holds_the_nodes_of_its_caps_and_has_the_surface_nodes_of_its_recipe(mesh_cache):
     prepared = prepare(Case(BALL_CLAMPED, BodyRecipe(nodes=300, graded=True)))
     rest, mesh = prepared.setup.body.rest, prepared.mesh
     assert abs(mesh.outer_count / 300 - 1) <= 0.05

@@ -23,85 +23,85 @@ from tests.studies.tiny import SQUEEZE, tiny_case
 ORGANS = [scene for scene in JUDGED if scene.held]
 
 
-def told(scene, mesh, filled=True):
+def warnings_of(scene, mesh, filled=True):
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", UserWarning)
         tell_shape(scene, mesh, filled)
     return [str(one.message) for one in caught]
 
 
-def test_flat_sides_of_few_nodes_are_told_with_both_numbers():
+def test_a_warning_names_both_errors_of_flat_sides():
     with pytest.warns(UserWarning, match=r"ball: .* up to 2 % of the size .* volume -9\.\d %; .* or quadratic"):
         prepare(tiny_case())
-    (sentence,) = told(SQUEEZE, mesh_for(SQUEEZE, 60, filled=False), filled=False)
+    (sentence,) = warnings_of(SQUEEZE, mesh_for(SQUEEZE, 60, filled=False), filled=False)
     assert "volume -9." in sentence
 
 
 def test_curved_sides_keep_it():
-    assert told(SQUEEZE, mesh_of(SQUEEZE, BodyRecipe("quadratic", 234))) == []
+    assert warnings_of(SQUEEZE, mesh_of(SQUEEZE, BodyRecipe("quadratic", 234))) == []
 
 
-def test_a_volume_that_is_too_large_is_told_as_well():
+def test_a_warning_names_a_volume_that_is_too_large():
     mesh = mesh_of(SQUEEZE, BodyRecipe("quadratic", 234))
-    (sentence,) = told(SQUEEZE, replace(mesh, points=1.003 * mesh.points))
+    (sentence,) = warnings_of(SQUEEZE, replace(mesh, points=1.003 * mesh.points))
     assert "volume +0.77 %" in sentence and "or quadratic" not in sentence
 
 
 @pytest.mark.parametrize("kind", ["tetrahedral", "quadratic"])
-def test_a_held_region_that_lost_a_facet_is_told_by_name(kind):
+def test_an_error_names_a_held_region_that_lost_a_facet(kind):
     scene = BALL_CLAMPED
     mesh = mesh_of(scene, BodyRecipe(kind, 294))
     held = scene.held[0]
     facets, off = held_facets(mesh, held), held_area_error(scene, mesh, held)
-    assert abs(off) < 0.03 and not any("held region" in line for line in told(scene, mesh))
+    assert abs(off) < 0.03 and not any("held region" in line for line in warnings_of(scene, mesh))
     points = np.setdiff1d(mesh.patches[held.name], facets[0])
     fewer = replace(mesh, patches=mesh.patches | {held.name: points})
     with pytest.raises(StudyError, match=rf"area of the held region '{held.name}' is -\d+ % off .*allowed: 10 %"):
         tell_shape(scene, fewer, filled=True)
 
 
-@pytest.mark.parametrize(("off", "said"), [(0.02, 0), (0.05, 1), (-0.05, 1), (-0.11, 2), (0.11, 2)])
-def test_the_held_area_is_warned_of_and_then_refused(monkeypatch, off, said):
+@pytest.mark.parametrize(("off", "severity"), [(0.02, 0), (0.05, 1), (-0.05, 1), (-0.11, 2), (0.11, 2)])
+def test_the_held_area_is_warned_of_and_then_refused(monkeypatch, off, severity):
     monkeypatch.setattr(kept_shape, "held_area_error", lambda *_: off)
     scene, mesh = BALL_CLAMPED, mesh_of(BALL_CLAMPED, BodyRecipe("quadratic", 294))
-    if said == 2:
+    if severity == 2:
         with pytest.raises(StudyError, match=r"held region 'bottom' is [-+]11 % off"):
             tell_shape(scene, mesh, filled=True)
     else:
-        assert sum("held region" in line for line in told(scene, mesh)) == said
+        assert sum("held region" in line for line in warnings_of(scene, mesh)) == severity
 
 
-def test_few_facets_under_a_probe_are_told_before_the_run(monkeypatch):
+def test_a_warning_names_few_facets_before_the_run(monkeypatch):
     few = mesh_of(LIVER_PROBE, BodyRecipe("quadratic", 394))
     many = mesh_of(LIVER_PROBE, BodyRecipe("quadratic", 594, graded=True))
-    (sentence,) = [line for line in told(LIVER_PROBE, few) if "touch" in line]
+    (sentence,) = [line for line in warnings_of(LIVER_PROBE, few) if "touch" in line]
     assert "below 20" in sentence and "graded='adaptive'" in sentence
     enough = touched_facets(LIVER_PROBE, many)
     assert enough > touched_facets(LIVER_PROBE, few) > 0
     monkeypatch.setattr(kept_shape, "FACETS", enough)
-    assert not any("touch" in line for line in told(LIVER_PROBE, many))
+    assert not any("touch" in line for line in warnings_of(LIVER_PROBE, many))
     assert touched_facets(BALL_CLAMPED, few) is None  # no probe
 
 
 def test_a_file_that_comes_as_it_is_has_its_own_shape(tmp_path):
-    """Its triangles do not follow the outline of a region: the staircase is told."""
+    """Its triangles do not follow the outline of a region: a warning names the staircase."""
     import meshio
 
     points, triangles = box((0, 0, 0), (0.1, 0.1, 0.1))
     meshio.write_points_cells(tmp_path / "box.ply", points, [("triangle", triangles)])
     organ = Organ("file", {"path": str(tmp_path / "box.ply"), "unit": "m"})
     whole = replace(SQUEEZE, organ=organ, obstacles=())
-    assert told(whole, mesh_for(whole, 60)) == []
+    assert warnings_of(whole, mesh_for(whole, 60)) == []
     region = HalfSpace((0.0, 0.0, 0.03), (0.0, 0.0, 1.0))
     held = replace(whole, held=(Held("foot", region),))
-    (sentence,) = told(held, mesh_for(held, 60))
+    (sentence,) = warnings_of(held, mesh_for(held, 60))
     assert "held region 'foot' -" in sentence and "off the true surface" not in sentence
 
 
 @pytest.mark.slow
 def test_the_flat_stomach_of_400_nodes_holds_too_little():
     scene = next(scene for scene in SCENES if scene.name == "stomach_press")
-    (sentence,) = told(scene, mesh_of(scene, BodyRecipe(nodes=400)))
+    (sentence,) = warnings_of(scene, mesh_of(scene, BodyRecipe(nodes=400)))
     assert "'cardia' -4 %" in sentence and "'pylorus' -4.1 %" in sentence
 
 

@@ -116,7 +116,7 @@ def test_a_finer_mesh_is_nested_in_the_coarser_one(family):
         np.testing.assert_array_equal(nodes(fine.mesh)[: fine.mesh.nvertices], fine.points[: fine.mesh.nvertices])
 
 
-def test_a_finer_mesh_has_about_as_many_elements_as_wanted(family):
+def test_a_finer_mesh_has_about_twice_as_many_elements(family):
     for (coarse, _), (fine, _) in pairwise(family):
         assert 1.95 < fine.mesh.nelements / coarse.mesh.nelements < 2.25
 
@@ -150,7 +150,7 @@ def test_held_caps_keep_their_area_and_come_closer_to_the_disc(family):
     assert max(map(max, missing)) < 0.03 and min(map(min, missing)) > 0
     below, above = np.array(missing).T
     assert (np.diff(above) < 0).all() and above[-1] < 0.2 * above[0]
-    assert below[-1] > 0.5 * below[0], "it was not asked to be finer there"
+    assert below[-1] > 0.5 * below[0], "nothing is refined there"
 
 
 def test_the_volume_approaches_that_of_the_ball(family):
@@ -192,10 +192,10 @@ def test_meshes_are_upright_and_their_middles_are_drawn_to_outlines(family):
 
 def test_the_same_marks_give_the_same_bits(base, family):
     again, parents = base.finer(beside_top_outline(base), 2 * base.mesh.nelements)
-    fine, known = family[1]
+    fine, fine_parents = family[1]
     np.testing.assert_array_equal(again.points, fine.points)
     np.testing.assert_array_equal(again.mesh.t, fine.mesh.t)
-    np.testing.assert_array_equal(parents, known)
+    np.testing.assert_array_equal(parents, fine_parents)
 
 
 def test_the_last_bits_of_an_indicator_change_no_mark(base):
@@ -222,19 +222,19 @@ def test_an_element_that_would_fold_keeps_the_nodes_that_are_safe():
     corners, elements = np.vstack([CORNERS, np.ones(3)]), np.array([[0, 1, 2, 3], [1, 2, 3, 4]])
     mesh = MeshTet2.from_mesh(MeshTet(np.ascontiguousarray(corners.T), np.ascontiguousarray(elements.T)))
     cells, safe = element_nodes(mesh), nodes(mesh)
-    wanted = safe.copy()
+    moved = safe.copy()
     alone = next(n for n in range(mesh.nvertices, len(safe)) if (cells == n).sum() == 1 and n in cells[0])
     far = next(n for n in range(mesh.nvertices, len(safe)) if (cells == n).sum() == 1 and n in cells[1])
-    wanted[alone] += 2.0 * (safe[cells[0, :4]].mean(axis=0) - safe[alone])
-    wanted[far] += 0.01
-    x, back = upright(safe, wanted, cells, 0.05)
+    moved[alone] += 2.0 * (safe[cells[0, :4]].mean(axis=0) - safe[alone])
+    moved[far] += 0.01
+    x, back = upright(safe, moved, cells, 0.05)
     np.testing.assert_array_equal(np.flatnonzero(back), [alone])
     np.testing.assert_array_equal(x[alone], safe[alone])
-    np.testing.assert_array_equal(x[far], wanted[far])
+    np.testing.assert_array_equal(x[far], moved[far])
 
 
 def test_a_body_that_comes_as_a_mesh_keeps_its_flat_sides(tmp_path):
-    """No true surface is known: nothing is moved."""
+    """It has no true surface: nothing is moved."""
     points, triangles, _ = cube(2)
     used = np.unique(triangles)
     path = write_obj(tmp_path / "box.obj", points[used], np.searchsorted(used, triangles))

@@ -100,12 +100,12 @@ class SlitBody:
         upper.sort_indices()
         solver = SymmetricSolver()
         solver.factor(upper)
-        wanted = scale * np.asarray(values, dtype=float)
-        found = solver.solve(np.concatenate([force.ravel()[free], np.zeros(self.body.kept.count), wanted]))
+        targets = scale * np.asarray(values, dtype=float)
+        solution = solver.solve(np.concatenate([force.ravel()[free], np.zeros(self.body.kept.count), targets]))
         solver.release()
         u = np.zeros(self.x.size)
-        u[free] = found[: len(free)]
-        return u.reshape(-1, 3), -scale * found[len(found) - len(rows) :]
+        u[free] = solution[: len(free)]
+        return u.reshape(-1, 3), -scale * solution[len(solution) - len(rows) :]
 
     def gap(self, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Distance from the axis of each pair of nodes [m], (p,), and how far they have parted, (p,) [m]."""
@@ -149,7 +149,7 @@ def straight(points: np.ndarray, tetrahedra: np.ndarray) -> MeshTet2:
 
 
 class FarTension:
-    """A tension along z at the flat outer facets of a mesh: of each its own normal, found by where a point is."""
+    """A tension along z at the flat outer facets of a mesh; the place of a point gives the facet and its normal."""
 
     def __init__(self, points: np.ndarray, tetrahedra: np.ndarray):
         outer = boundary(tetrahedra)

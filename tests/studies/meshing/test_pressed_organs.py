@@ -59,9 +59,9 @@ def test_a_liver_nobody_has_seen(member, mesh_cache, tmp_path, monkeypatch):
     def error() -> float:
         return abs(last_force(scene, measure(Case(scene, body, dt_fraction=0.8))) / truth - 1)
 
-    found = error()
+    drawn_error = error()
     monkeypatch.setattr(graded_mesh, "middles", lambda scene: 0.5)
-    assert found < 0.03 and found < 0.5 * error()
+    assert drawn_error < 0.03 and drawn_error < 0.5 * error()
 
 
 @pytest.mark.campaign
@@ -84,6 +84,6 @@ def test_a_spleen_nobody_has_seen_hangs(seed, mesh_cache, tmp_path, monkeypatch)
         assert record.status == Status.OK, record.message
         return mean_error(Run(case, record, truth))
 
-    found = error()
+    drawn_error = error()
     monkeypatch.setattr(graded_mesh, "middles", lambda scene: 0.5)
-    assert found < 1.7 and found < 0.6 * error()
+    assert drawn_error < 1.7 and drawn_error < 0.6 * error()

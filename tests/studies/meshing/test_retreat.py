@@ -17,21 +17,21 @@ def measure(points, cells, which):
 
 
 def test_a_move_that_harms_no_element_is_made_whole():
-    wanted = CORNERS + np.array([0.0, 0.0, 0.3])
-    assert (retreat(CORNERS, wanted, CELLS, measure, "two") == 1.0).all()
+    moved = CORNERS + np.array([0.0, 0.0, 0.3])
+    assert (retreat(CORNERS, moved, CELLS, measure, "two") == 1.0).all()
 
 
 def test_a_node_that_would_turn_its_element_stops_before_and_the_others_go_on():
     """Node 3 sinks below the base of its element at half of its way: 1 - 2 s of the volume is left at a share s."""
-    wanted = CORNERS.copy()
-    wanted[3, 2], wanted[4, 2] = -1.0, -2.0
-    share = retreat(CORNERS, wanted, CELLS, measure, "two")
+    moved = CORNERS.copy()
+    moved[3, 2], moved[4, 2] = -1.0, -2.0
+    share = retreat(CORNERS, moved, CELLS, measure, "two")
     left = (1.0 - FLOOR) / 2.0
     assert left - STEP < share[3] <= left
     assert (np.delete(share, 3) == 1.0).all()
 
 
-def test_an_element_that_is_flat_before_it_moves_is_told_with_its_place():
+def test_an_element_that_is_flat_before_it_moves_is_an_error_with_its_place():
     flat = CORNERS.copy()
     flat[3, 2] = 0.0
     with pytest.raises(StudyError, match=r"^two: the element at \(250\.0, 250\.0, 0\.0\) mm is flat or"):

@@ -78,7 +78,7 @@ def test_a_base_is_finer_where_the_probe_will_be_upright_and_still_held(mesh_cac
 
 
 def test_a_body_from_a_file_keeps_its_own_outline():
-    """No true surface is known: a patch is the polygon of its facets, on the finer mesh as well."""
+    """It has no true surface: a patch is the polygon of its facets, on the finer mesh as well."""
     points, _, cells = cube(2)
     body = with_patches(MeshTet(points.T.copy(), cells.T.copy()), [np.flatnonzero(points[:, 2] < -0.049)])
     finer = body.bisected(body.at_outlines()).bisected(np.arange(5))

@@ -60,14 +60,14 @@ def test_a_piece_that_died_is_stored_as_failed(tmp_path):
     assert (run.record.status, run.record.message) == (Status.FAILED, "its process died")
     assert "the reference of 'ball_squeeze' is failed: its process died" in remarks[0]
     assert [standing.status for standing in standings(ledger, tiny_study(cases=(case,)))] == ["failed"] * 2
-    said = failures.sentence("again")
-    assert said.startswith(f"failed: {jobs[0].label} (its process died), and 1 more; all others are done")
+    sentence = failures.sentence("again")
+    assert sentence.startswith(f"failed: {jobs[0].label} (its process died), and 1 more; all others are done")
 
 
 def test_what_another_command_has_done_meanwhile_is_not_done_again(results):
     (job,) = (job for job in jobs_of(results, [tiny_study()]) if job.work == tiny_case(timed=True))
     planned = replace(job, initial_state=job.state())
-    assert not planned.done_meanwhile(), "it is asked for as it is"
+    assert not planned.done_meanwhile(), "its file is that of the plan"
     path = job.path()
     write_record(path, read_record(path))
     before = path.read_bytes(), path.stat().st_mtime_ns
@@ -81,14 +81,14 @@ def test_workers_get_caches_that_do_not_depend_on_their_folder(tmp_path, monkeyp
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("ORGANBENCH_CACHE", "meshes")
     monkeypatch.setenv("NUMBA_CACHE_DIR", "compiled")
-    wanted = environment()
-    assert wanted["ORGANBENCH_CACHE"] == str(tmp_path / "meshes")
-    assert wanted["NUMBA_CACHE_DIR"] == str(tmp_path / "compiled")
-    assert wanted["OMP_NUM_THREADS"] == "1"
+    variables = environment()
+    assert variables["ORGANBENCH_CACHE"] == str(tmp_path / "meshes")
+    assert variables["NUMBA_CACHE_DIR"] == str(tmp_path / "compiled")
+    assert variables["OMP_NUM_THREADS"] == "1"
 
 
 def test_one_command_at_a_time_measures(tmp_path):
-    told = []
+    lines = []
     program = "import sys; from pathlib import Path; from studies.metrics.timing.alone import alone\n"
     program += "with alone(Path(sys.argv[1]), lambda: print('waits', flush=True)): print('inside', flush=True)"
     command = [sys.executable, "-c", program, str(tmp_path)]
@@ -96,11 +96,11 @@ def test_one_command_at_a_time_measures(tmp_path):
     with alone(tmp_path):
         other = subprocess.Popen(command, env=env, stdout=subprocess.PIPE, text=True)
         assert other.stdout is not None
-        told.append(other.stdout.readline())
+        lines.append(other.stdout.readline())
         time.sleep(0.2)
         assert other.poll() is None, "it waits"
-    told += other.stdout.read().splitlines(keepends=True)
-    assert (other.wait(), told) == (0, ["waits\n", "inside\n"])
+    lines += other.stdout.read().splitlines(keepends=True)
+    assert (other.wait(), lines) == (0, ["waits\n", "inside\n"])
     other.stdout.close()
 
 

@@ -24,10 +24,10 @@ def test_status_says_how_many_kinds_of_machines_a_study_mixes(results, tiny_file
     here = stored_by(results, study.cases[0], machine="00000000")
     assert machines_of(standings(Ledger(results), study)) == {here: 2, "00000000": 1}
     shown = organbench("status", tiny_file, "--results", results)[1]
-    told = (
+    sentence = (
         f"made on 2 kinds of processors, whose results differ by rounding: 2 of machine {here}, 1 of machine 00000000"
     )
-    assert f"  {told}\n" in shown
+    assert f"  {sentence}\n" in shown
 
 
 def test_portable_results_are_equal_on_every_machine(results):

@@ -136,8 +136,8 @@ def environment_of(name):
 def test_a_process_has_its_variables_and_this_one_keeps_its_own(monkeypatch):
     monkeypatch.setenv("OMP_NUM_THREADS", "7")
     monkeypatch.delenv("MKL_NUM_THREADS", raising=False)
-    wanted = {"OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
-    ended = list(run_each(list(wanted), 2, environment_of, environment=wanted))
+    variables = {"OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
+    ended = list(run_each(list(variables), 2, environment_of, environment=variables))
     assert [(one.result, one.cause) for one in ended] == [("1", None)] * 2
     assert os.environ["OMP_NUM_THREADS"] == "7" and "MKL_NUM_THREADS" not in os.environ
 

@@ -1,4 +1,4 @@
-"""What may go, goes when it is asked for by name; a current result never does."""
+"""What may go, goes by the name of its rule; a current result never does."""
 
 import os
 import shutil
@@ -20,7 +20,7 @@ from tests.studies.tiny import content, diverging_case, tiny_case, tiny_study
 TIMED = tiny_case(timed=True)
 
 
-def found(root, study=None, rules=tuple(Rule), **options):
+def rules_by_name(root, study=None, rules=tuple(Rule), **options):
     """Name of a file -> the rule that lets it go."""
     return {one.path.name: one.rule for one in prunable(Ledger(root), [study or tiny_study()], rules, **options)}
 
@@ -47,14 +47,14 @@ def spoil(root):
 def test_of_a_finished_study_nothing_may_go(results):
     """Also what diverged: that is a result."""
     link_study(Ledger(results), "tiny")
-    assert found(results, references=True) == {}
+    assert rules_by_name(results, references=True) == {}
 
 
 @pytest.mark.parametrize("rule", Rule)
 def test_a_rule_names_its_files_and_no_others(results, rule):
     expected = spoil(results)
     study = tiny_study(cases=tiny_study().cases[:2])
-    assert found(results, study) == {name: rule for rule, names in expected.items() for name in names}
+    assert rules_by_name(results, study) == {name: rule for rule, names in expected.items() for name in names}
     before, kept = content(results / "tiny"), expected[rule]
     gone = remove(prunable(Ledger(results), [study], [rule]))
     assert {one.path.name for one in gone} == kept
@@ -65,21 +65,21 @@ def test_a_rule_names_its_files_and_no_others(results, rule):
 def test_frame_times_of_other_code_go_alone(results):
     timing = timing_file(results, "tiny", TIMED)
     write_record(timing, replace(read_record(timing), fingerprint="0" * 64))
-    assert found(results) == {timing.name: Rule.STALE}
+    assert rules_by_name(results) == {timing.name: Rule.STALE}
 
 
 def test_frame_times_of_another_machine_stay(results):
     timing = timing_file(results, "tiny", TIMED)
     timing.rename(timing.with_name(timing.name.replace(timing.name.split(".")[-2], "89abcdef")))
-    assert found(results) == {}
+    assert rules_by_name(results) == {}
 
 
 def test_young_files_are_spared(results):
     spoil(results)
-    assert found(results, older=1.0) == {}
+    assert rules_by_name(results, older=1.0) == {}
     part = next((results / "tiny").glob("*.part"))
     os.utime(part, (time.time() - 3 * DAY,) * 2)
-    assert found(results, older=2.0) == {part.name: Rule.ORPHANS}
+    assert rules_by_name(results, older=2.0) == {part.name: Rule.ORPHANS}
 
 
 def test_what_is_written_anew_meanwhile_stays(results):
@@ -92,22 +92,22 @@ def test_what_is_written_anew_meanwhile_stays(results):
     assert {standing.status for standing in standings(Ledger(results), tiny_study())} == {"ok", "diverged"}
 
 
-def test_references_stay_unless_they_are_asked_for(solved, tmp_path):
+def test_references_stay_without_the_option(solved, tmp_path):
     root = shutil.copytree(solved, tmp_path / "results")
     study = tiny_study(cases=(tiny_case(scene=SCENE),))
-    assert found(root, study, references=True) == {}
+    assert rules_by_name(root, study, references=True) == {}
     path = next((root / "reference").glob("*.h5"))
     write_record(path, replace(read_record(path), fingerprint="0" * 64))
     coarse = replace(SCENE, reference=SCENE.reference.smaller())
-    assert found(root, study) == {}
-    assert found(root, study, references=True) == {path.name: Rule.STALE}
-    fewer = found(root, tiny_study(cases=(tiny_case(scene=coarse),)), references=True)
+    assert rules_by_name(root, study) == {}
+    assert rules_by_name(root, study, references=True) == {path.name: Rule.STALE}
+    fewer = rules_by_name(root, tiny_study(cases=(tiny_case(scene=coarse),)), references=True)
     assert fewer == {path.name: Rule.SUPERSEDED}
     elsewhere = replace(SCENE, name="elsewhere")
-    assert found(root, tiny_study(cases=(tiny_case(scene=elsewhere),)), references=True) == {}
+    assert rules_by_name(root, tiny_study(cases=(tiny_case(scene=elsewhere),)), references=True) == {}
 
 
-def test_the_command_lists_and_removes_only_when_told(organbench, refused, results, tiny_file):
+def test_the_command_lists_and_removes_only_with_yes(organbench, refused, results, tiny_file):
     expected = spoil(results)
     before = content(results / "tiny")
     code, out, err = organbench("prune", tiny_file, "--results", results)

@@ -31,7 +31,7 @@ def engine_at(address, patience=20.0, **settings):
 
 
 def swept(root, study, address, **settings):
-    """Runs a study there: number of pieces, and what was told of them."""
+    """Runs a study there: number of pieces, and the progress of them."""
     progress = Silent()
     with engine_at(address) as engine:
         return run_studies(root, [study], engine, progress, **settings), progress
@@ -39,13 +39,13 @@ def swept(root, study, address, **settings):
 
 def physics(root, study):
     """What is stored of each case, but for the seconds that it took."""
-    found = {}
+    cases = {}
     for case in study.cases:
         record = read_record(case_path(root, study.name, case))
-        known = {name: value for name, value in record.attributes.items() if name != "seconds"}
+        attributes = {name: value for name, value in record.attributes.items() if name != "seconds"}
         fields = {name: field.values for name, field in record.fields.items()}
-        found[case.name] = repr(replace(record, attributes=known, fields={})), fields  # NaN is not equal to itself
-    return found
+        cases[case.name] = repr(replace(record, attributes=attributes, fields={})), fields  # NaN is not equal to itself
+    return cases
 
 
 def assert_equal_bits(one, other):

@@ -42,10 +42,10 @@ def test_a_worker_like_this_one_is_fit(check):
     ],
 )
 def test_what_is_wrong_with_a_worker_is_a_sentence(check, change, fault):
-    known = {name: value for name, value in change.items() if name in check.ours}
-    other = {name: value for name, value in change.items() if name not in check.ours}
+    versions = {name: value for name, value in change.items() if name in check.ours}
+    fields = {name: value for name, value in change.items() if name not in check.ours}
     with pytest.raises(StudyError, match=fault):
-        raise StudyError(replace(check, ours=check.ours | known, **other).answer()[1])
+        raise StudyError(replace(check, ours=check.ours | versions, **fields).answer()[1])
 
 
 def test_modules_next_to_a_file_of_the_user_are_compared(tmp_path, check):
@@ -74,8 +74,8 @@ class Deadly(Check):
 )
 def test_a_worker_whose_process_fails_is_unfit(check, tmp_path, files, kind, fault):
     (tmp_path / "mine.py").write_bytes(b"import nowhere")
-    asked = kind(check.token, check.content, check.ours, ())
-    plugin = JobPlugin("session", {}, pickle.dumps(Preparation(str(tmp_path), files)), pickle.dumps(asked))
+    task = kind(check.token, check.content, check.ours, ())
+    plugin = JobPlugin("session", {}, pickle.dumps(Preparation(str(tmp_path), files)), pickle.dumps(task))
     plugin.begin()
     try:
         with pytest.raises(StudyError, match=fault):
@@ -119,7 +119,7 @@ def test_a_job_that_no_worker_has_the_memory_for_is_refused_before_anything_runs
         Small().check_memory([large, large], [499.0, 600.0])
 
 
-def test_the_size_of_a_reference_is_declared_before_it_is_known():
+def test_the_size_of_a_reference_is_estimated_before_it_is_solved():
     for level, unknowns in ((0.12, 16_482), (0.22, 4_391)):
         needs = ReferenceJob(Path("nowhere"), "tiny", ReferenceSolve(octant(level))).needs
         assert factor_memory(unknowns) <= needs - MEMORY < 3.5 * factor_memory(unknowns)

@@ -31,9 +31,9 @@ def test_a_cluster_leaves_what_this_machine_leaves(scheduler, finished_sweep, tm
 
 def test_a_scheduler_that_is_not_there_is_a_sentence(monkeypatch, tmp_path, tiny_file, refused):
     monkeypatch.setattr("studies.sweep.engines.cluster.CONNECT_SECONDS", 0.5)
-    said = refused("run", tiny_file, "--results", tmp_path / "results", "--on", "tcp://127.0.0.1:9")
-    assert said.startswith("organbench: there is no Dask scheduler at tcp://127.0.0.1:9 (")
-    assert said.endswith("; start one with `dask scheduler`, or correct the address")
+    sentence = refused("run", tiny_file, "--results", tmp_path / "results", "--on", "tcp://127.0.0.1:9")
+    assert sentence.startswith("organbench: there is no Dask scheduler at tcp://127.0.0.1:9 (")
+    assert sentence.endswith("; start one with `dask scheduler`, or correct the address")
 
 
 @pytest.mark.campaign
@@ -55,8 +55,8 @@ def test_a_folder_that_workers_do_not_see_is_a_sentence(scheduler, tmp_path, mon
 
 
 def test_two_ways_to_say_how_many_are_refused(refused, tiny_file, tmp_path):
-    said = refused("run", tiny_file, "--results", tmp_path, "--jobs", "2", "--on", "local:3")
-    assert "give either --jobs or --on" in said
+    sentence = refused("run", tiny_file, "--results", tmp_path, "--jobs", "2", "--on", "local:3")
+    assert "give either --jobs or --on" in sentence
 
 
 def test_a_worker_needs_one_scheduler(refused):

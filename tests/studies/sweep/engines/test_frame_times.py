@@ -23,17 +23,17 @@ class MadeUp:
     name = "session"
 
     def __init__(self, answer):
-        self.answer, self.asked = answer, []
-        self.known = {place: {"name": place} for place in MACHINES}
+        self.answer, self.workers = answer, []
+        self.machines = {place: {"name": place} for place in MACHINES}
         self.client = SimpleNamespace(run=lambda ask, name, workers: {place: MACHINES[place] for place in workers})
 
     def fit(self):
-        return self.known
+        return self.machines
 
     def submit(self, request, workers):
-        self.asked.append(workers[0])
+        self.workers.append(workers[0])
         if self.answer(workers[0]) is None:
-            del self.known[workers[0]]
+            del self.machines[workers[0]]
         return workers[0]
 
     def ended(self, futures):
@@ -44,7 +44,7 @@ class MadeUp:
 
 
 def measured(root, answer):
-    """What `measure` gives, what it told, and to whom the work went."""
+    """What `measure` gives, its progress, and the workers that got the work."""
 
     class Here(Cluster):
         @contextmanager
@@ -55,16 +55,16 @@ def measured(root, answer):
     session, progress = MadeUp(answer), Silent()
     executor = Here(lambda: None, 1.0, portable=True)  # type: ignore[arg-type]
     executor.client = session.client  # type: ignore[assignment]
-    return executor.measure(Ledger(root), tiny_study(), progress, print, None), progress, session.asked
+    return executor.measure(Ledger(root), tiny_study(), progress, print, None), progress, session.workers
 
 
 def test_one_worker_of_each_kind_of_machine_measures(tmp_path):
-    count, progress, asked = measured(tmp_path, lambda place: (3, 0.0))
+    count, progress, workers = measured(tmp_path, lambda place: (3, 0.0))
     assert (count, progress.begun) == (6, [("timing", 2)])
-    assert asked == ["a", "c"]
+    assert workers == ["a", "c"]
 
 
-def test_a_machine_that_others_use_is_told_of(tmp_path):
+def test_a_warning_names_a_machine_that_others_use(tmp_path):
     with pytest.warns(
         UserWarning, match=r"during the frame times of tiny other programs used 40 % .* of worker c: the times may"
     ):

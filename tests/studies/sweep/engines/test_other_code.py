@@ -76,8 +76,8 @@ def worker(file, name):
 @pytest.mark.campaign
 def test_a_worker_with_other_code_is_refused_by_name(file, other_code):
     with running(worker(file, "another"), other_code, other_code):
-        said = refusal(file, other_code)
-    assert said.startswith("worker another differs in the code of organbench; put the same version there")
+        sentence = refusal(file, other_code)
+    assert sentence.startswith("worker another differs in the code of organbench; put the same version there")
 
 
 WAITS = """
@@ -110,12 +110,12 @@ STUDY = tiny_study(cases=tuple(tiny_case(method=Waits(file=f), dt_fraction=0.4 +
 
 @pytest.mark.campaign
 def test_a_worker_that_joins_later_with_other_code_gets_nothing(file, other_code, tmp_path_factory, monkeypatch):
-    here, said = tmp_path_factory.mktemp("here"), []
+    here, warnings = tmp_path_factory.mktemp("here"), []
     (here / "waits.py").write_text(WAITS)
     study = find_study(str(here / "waits.py"))
 
     def heard(text, stacklevel):
-        said.append(text)
+        warnings.append(text)
         (here / "go-on").touch()
 
     class Follower(Silent):
@@ -129,7 +129,7 @@ def test_a_worker_that_joins_later_with_other_code_gets_nothing(file, other_code
     with running(worker(file, "good"), here), engine_at(address, 60.0) as one, ExitStack() as later:
         run_studies(here / "results", [study], one, Follower())
     fault = "differs in the code of organbench; put the same version there, and start the worker again"
-    assert said == [f"worker late {fault}; it gets no job"]
+    assert warnings == [f"worker late {fault}; it gets no job"]
     assert len(list((here / "results" / "tiny").iterdir())) == 3
 
 
@@ -137,5 +137,5 @@ def test_a_worker_that_joins_later_with_other_code_gets_nothing(file, other_code
 def test_a_worker_without_organbench_is_refused_by_name(file, tmp_path):
     words = ["--scheduler-file", str(file), "--name", "bare", "--no-dashboard", "--no-nanny"]
     with running([sys.executable, "-c", WITHOUT, *words], tmp_path):
-        said = refusal(file, tmp_path)
-    assert said.startswith("worker bare cannot load organbench;")
+        sentence = refusal(file, tmp_path)
+    assert sentence.startswith("worker bare cannot load organbench;")

@@ -52,7 +52,7 @@ def test_records_say_so_and_others_run_again(tmp_path):
     path = case_path(tmp_path, study.name, refused)
     assert "portable" not in read_record(path).attributes
     assert run_studies(tmp_path, [study], portable, Silent()) == 1, "it was not computed portably"
-    told = read_record(path).attributes["portable"]
-    assert all(f"{name}={value}" in told for name, value in SETTINGS.items() if value)
+    settings = read_record(path).attributes["portable"]
+    assert all(f"{name}={value}" in settings for name, value in SETTINGS.items() if value)
     assert [run_studies(tmp_path, [study], engine, Silent()) for engine in (portable, native)] == [0, 0]
     assert "NUMBA_CPU_NAME" not in os.environ and "ORGANBENCH_PORTABLE" not in os.environ

@@ -91,22 +91,22 @@ def refusal(tmp_path, text, refused):
 def test_a_queueing_system_that_is_not_here_is_a_sentence(tmp_path, monkeypatch, refused):
     (tmp_path / "openssl").symlink_to(str(shutil.which("openssl")))
     monkeypatch.setenv("PATH", str(tmp_path))
-    said = refusal(tmp_path, "kind: pbs\nworkers: 2\nhost: 127.0.0.1", refused)
-    assert re.search(r"pbs cannot be used here \(.*qsub.*\): correct `kind`, or run on a machine that has it", said)
+    sentence = refusal(tmp_path, "kind: pbs\nworkers: 2\nhost: 127.0.0.1", refused)
+    assert re.search(r"pbs cannot be used here \(.*qsub.*\): correct `kind`, or run on a machine that has it", sentence)
 
 
 def test_a_job_that_is_refused_is_a_sentence(slurm, refused):
     (slurm / "bin" / "sbatch").write_text("#!/bin/bash\necho no such partition >&2\nexit 1\n")
-    said = refusal(slurm, "kind: slurm\nworkers: 2\nhost: 127.0.0.1\nqueue: shrt", refused)
-    assert re.search(r"slurm did not take a job \(.*no such partition.*\): correct the settings", said)
+    sentence = refusal(slurm, "kind: slurm\nworkers: 2\nhost: 127.0.0.1\nqueue: shrt", refused)
+    assert re.search(r"slurm did not take a job \(.*no such partition.*\): correct the settings", sentence)
 
 
 def test_a_program_that_starts_workers_is_started_for_each_and_ended(tmp_path):
-    told, command = [], f"echo $$ {{processes}} {{memory}} ${{EXTRA}} >> {tmp_path}/started; sleep 600 & wait"
+    messages, command = [], f"echo $$ {{processes}} {{memory}} ${{EXTRA}} >> {tmp_path}/started; sleep 600 & wait"
     settings = Settings(
         "command", workers=2, processes=3, memory_gb=8, command=command, setup=("EXTRA=x",), host="127.0.0.1"
     )
-    with scheduler_with_workers(settings, tmp_path, told.append) as address:
+    with scheduler_with_workers(settings, tmp_path, messages.append) as address:
         assert re.fullmatch(r"tls://127\.0\.0\.1:\d+", address)
         (folder,) = (tmp_path / "cache").iterdir()
         assert address in (folder / "scheduler.json").read_text()
@@ -116,21 +116,21 @@ def test_a_program_that_starts_workers_is_started_for_each_and_ended(tmp_path):
         words = started(tmp_path)
         assert [rest for _, *rest in words] == [["3", "8", "x"]] * 2
     assert all(is_gone(int(group)) for group, *_ in words)
-    assert told == [f"2 workers started; what they print is in {folder}"]
+    assert messages == [f"2 workers started; what they print is in {folder}"]
     assert not (folder / "scheduler.json").exists()
 
 
 def started(folder):
-    """What each program that was started has said."""
+    """The words that each program has written."""
     file = folder / "started"
     return [line.split() for line in file.read_text().splitlines()] if file.exists() else []
 
 
 def test_the_examples_of_the_docs_are_read(tmp_path):
     text = (ROOT / "docs" / "cluster.md").read_text(encoding="utf-8")
-    found = re.findall(r"```yaml\n(.*?)```", text, re.DOTALL)
+    examples = re.findall(r"```yaml\n(.*?)```", text, re.DOTALL)
     read = []
-    for example in found:
+    for example in examples:
         (tmp_path / "jobs.yaml").write_text(example)
         read.append(read_settings(tmp_path / "jobs.yaml"))
     assert [settings.kind for settings in read] == ["slurm", "command"]
@@ -163,7 +163,7 @@ def test_words_say_where_jobs_run(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("on", "told"),
+    ("on", "message"),
     [
         ("local:none", r"give the number of processes, as local:4"),
         ("local:0", "give the number of processes"),
@@ -171,8 +171,8 @@ def test_words_say_where_jobs_run(tmp_path):
         ("nowhere.yaml", r"there is no file nowhere\.yaml; docs/cluster\.md shows how to write one"),
     ],
 )
-def test_other_words_are_refused(on, told):
-    with pytest.raises(StudyError, match=told):
+def test_other_words_are_refused(on, message):
+    with pytest.raises(StudyError, match=message):
         chosen(on)
 
 
@@ -185,7 +185,7 @@ def test_a_missing_package_is_named(monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("text", "told"),
+    ("text", "message"),
     [
         ("kind: slurm\nworkers: 2\nproceses: 3", r"unknown setting in jobs\.yaml 'proceses'; did you mean 'processes'"),
         ("kind: lfs\nworkers: 2", r"kind: input should be 'slurm', .* or 'command'"),
@@ -199,10 +199,10 @@ def test_a_missing_package_is_named(monkeypatch):
         ("kind: [slurm", r"cannot be read as YAML"),
     ],
 )
-def test_a_file_that_says_something_else_is_refused(tmp_path, text, told):
+def test_a_file_that_says_something_else_is_refused(tmp_path, text, message):
     file = tmp_path / "jobs.yaml"
     file.write_text(text)
-    with pytest.raises(StudyError, match=told) as stop:
+    with pytest.raises(StudyError, match=message) as stop:
         read_settings(file)
     assert "\n" not in str(stop.value)
 
@@ -217,7 +217,7 @@ def script(folder, **changes):
 
 
 @pytest.mark.parametrize(
-    ("kind", "asked"),
+    ("kind", "directives"),
     [
         ("slurm", {"#SBATCH -p short", "#SBATCH --cpus-per-task=16", "#SBATCH --mem=30G", "#SBATCH -t 02:30:00"}),
         ("pbs", {"#PBS -q short", "#PBS -l select=1:ncpus=16:mem=30GB", "#PBS -l walltime=02:30:00"}),
@@ -227,10 +227,10 @@ def script(folder, **changes):
         ("htcondor", {"MY.DaskWorkerCores = 16", "MY.DaskWorkerMemory = 32000000000", "accounting_group = surgery"}),
     ],
 )
-def test_a_job_script_asks_for_what_the_file_says(tmp_path, kind, asked):
+def test_a_job_script_asks_for_what_the_file_says(tmp_path, kind, directives):
     changes = {"options": ("accounting_group = surgery",), "hours": None, "queue": ""} if kind == "htcondor" else {}
     lines = script(tmp_path, kind=kind, **changes)
-    assert asked <= set(lines), set(asked) - set(lines)
+    assert directives <= set(lines), set(directives) - set(lines)
     (worker,) = (line for line in lines if "distributed.cli.dask_worker" in line)
     assert "module load python" in (worker if kind == "htcondor" else lines)
     assert "tls://127.0.0.1:" in worker and "--nthreads 16" in worker and "--no-dashboard" in worker
@@ -242,7 +242,7 @@ def test_every_queueing_system_is_tried():
     assert {kind for kind, _ in mark.args[1]} == set(QUEUES)
 
 
-def test_no_time_is_asked_for_where_none_is_given(tmp_path):
+def test_a_job_script_has_no_time_where_none_is_given(tmp_path):
     lines = script(tmp_path, kind="slurm", hours=None, memory_gb=None, options=("--account=surgery",))
     assert not [line for line in lines if line.startswith("#SBATCH -t")]
     assert {"#SBATCH --mem=30G", "#SBATCH --account=surgery"} <= set(lines), "2 GB for each process"
