@@ -40,8 +40,8 @@ def nearest_vertex(queries, points, triangles):
 
 @pytest.mark.parametrize(("query", "distance"), REGIONS.values(), ids=REGIONS)
 def test_each_region_of_a_triangle(query, distance):
-    found = distance_to_surface(np.array([query]), TRIANGLE, ONE)
-    assert found == pytest.approx([distance], abs=1e-14)
+    distances = distance_to_surface(np.array([query]), TRIANGLE, ONE)
+    assert distances == pytest.approx([distance], abs=1e-14)
 
 
 def test_a_triangle_without_area_is_its_longest_side():
@@ -52,8 +52,8 @@ def test_a_triangle_without_area_is_its_longest_side():
         middle = np.abs(share[k]) / 2
         flat = np.array([a[k], a[k] + way[k], a[k] + middle * way[k]])
         beyond = np.abs(place[k] - np.clip(place[k], 0, 1)) * np.linalg.norm(way[k])
-        found = distance_to_surface((a[k] + place[k] * way[k])[None], flat, ONE)
-        np.testing.assert_allclose(found, beyond, atol=1e-12)
+        distances = distance_to_surface((a[k] + place[k] * way[k])[None], flat, ONE)
+        np.testing.assert_allclose(distances, beyond, atol=1e-12)
 
 
 def test_nearest_vertex_would_be_noticed():
@@ -68,10 +68,10 @@ def test_nearest_vertex_would_be_noticed():
 def test_a_triangle_is_all_its_points(p, a, b, c):
     p, a, b, c = map(np.array, (p, a, b, c))
     sides = [np.linalg.norm(v) for v in (b - a, c - b, a - c)]
-    found = distance_to_surface(p[None], np.array([a, b, c]), ONE)[0]
+    distance = distance_to_surface(p[None], np.array([a, b, c]), ONE)[0]
     sampled = float(np.linalg.norm(dense(a, b, c) - p, axis=1).min())
     # A point of a triangle is at most one spacing of the samples away from one of them.
-    assert found - 1e-7 <= sampled <= found + max(sides) / 60 + 1e-7
+    assert distance - 1e-7 <= sampled <= distance + max(sides) / 60 + 1e-7
 
 
 @settings(deadline=None, max_examples=50)
@@ -83,9 +83,9 @@ def test_a_soup_is_all_its_triangles(seed):
     corners = centres + random.uniform(-1, 1, (80, 3, 3)) * 10.0 ** random.uniform(-2, 0.5, (80, 1, 1))
     queries = random.uniform(-1, 1, (20, 3))
     triangles = np.arange(240).reshape(80, 3)
-    found = distance_to_surface(queries, corners.reshape(-1, 3), triangles)
+    distances = distance_to_surface(queries, corners.reshape(-1, 3), triangles)
     single = [distance_to_surface(queries, c, ONE) for c in corners]
-    np.testing.assert_allclose(found, np.min(single, axis=0), rtol=1e-12, atol=1e-14)
+    np.testing.assert_allclose(distances, np.min(single, axis=0), rtol=1e-12, atol=1e-14)
 
 
 def test_concentric_spheres():
@@ -93,8 +93,8 @@ def test_concentric_spheres():
     points, triangles = mesh.points, mesh.triangles
     outer = 1.2 * points
     # Chords lie inside the sphere: seen from outside, the other surface is farther by their sag, edge²/8R ≈ 1.2 % of R.
-    found = hausdorff(points, triangles, outer, triangles)
-    assert 0.2 * 0.05 * (1 - 1e-12) <= found <= 0.2 * 0.05 + 0.012 * 0.05
+    distance = hausdorff(points, triangles, outer, triangles)
+    assert 0.2 * 0.05 * (1 - 1e-12) <= distance <= 0.2 * 0.05 + 0.012 * 0.05
     assert hausdorff(points, triangles, points, triangles) < 1e-12
 
 

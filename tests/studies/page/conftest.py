@@ -8,7 +8,7 @@ from tests.studies.page.made_up_page import made_up_page
 
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 FLAGS = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
-"""WebGL by software, which has to be asked for."""
+"""WebGL by software, which needs an option."""
 
 
 @pytest.fixture(scope="session")
@@ -31,8 +31,8 @@ def browser():
 
 @pytest.fixture
 def visit(browser, file):
-    """Opens the page; afterwards nothing may have been asked for or complained of but what `complaints` lists."""
-    contexts, asked, complaints = [], [], []
+    """Opens the page; afterwards the only request was the page, and `complaints` is empty."""
+    contexts, requests, complaints = [], [], []
 
     def go(before: str = "", where: str = "", **options):
         context = browser.new_context(offline=True, **{"viewport": {"width": 1280, "height": 900}} | options)
@@ -40,7 +40,7 @@ def visit(browser, file):
         if before:
             context.add_init_script(before)
         page = context.new_page()
-        page.on("request", lambda request: asked.append(request.url))
+        page.on("request", lambda request: requests.append(request.url))
         page.on("console", lambda message: complaints.append(message.text))
         page.on("pageerror", lambda error: complaints.append(str(error)))
         page.goto(file.as_uri() + where)
@@ -51,4 +51,4 @@ def visit(browser, file):
     yield go
     for context in contexts:
         context.close()
-    assert {url.split("#")[0] for url in asked} <= {file.as_uri()} and complaints == []
+    assert {url.split("#")[0] for url in requests} <= {file.as_uri()} and complaints == []

@@ -1,4 +1,4 @@
-"""A page of made-up runs: bodies that move beside a reference, frame times, and names that break a careless page."""
+"""A page of made-up runs: bodies that move next to a reference, frame times, and names that break a careless page."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -63,9 +63,9 @@ def theirs() -> list[Run]:
     """What other programs handed in: one on the same mesh, the other nothing."""
     made = moving(run(HELD, error=0.05, frame_ms=0.5))
     case = Case(HELD, made.case.body, outside("theirs-half_step"))
-    known = {ENTRY: "theirs.npz sha256:0", "dt": float("nan"), "dt_limit": float("nan")}
+    attributes = {ENTRY: "theirs.npz sha256:0", "dt": float("nan"), "dt_limit": float("nan")}
     fields = {name: kept for name, kept in made.record.fields.items() if not name.startswith("surface")}
-    record = replace(made.record, key=case.key, attributes=made.record.attributes | known, fields=fields)
+    record = replace(made.record, key=case.key, attributes=made.record.attributes | attributes, fields=fields)
     skipped = Case(HELD, made.case.body, outside("unable"))
     return [
         replace(made, case=case, record=record),

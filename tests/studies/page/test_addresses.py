@@ -1,5 +1,5 @@
-"""Every case of report.html has an address, which opens it, follows what is chosen, and goes back; what lies beside the
-page is loaded from there."""
+"""Every case of report.html has an address, which opens it, follows what is chosen, and goes back; parts of the page
+are loaded from the files next to it."""
 
 import json
 import shutil
@@ -51,7 +51,7 @@ def test_the_address_follows_and_the_back_button_goes_back(visit):
     wait_for(page, second)
 
 
-def test_an_unknown_address_is_told_and_the_first_case_shown(visit):
+def test_an_unknown_address_has_a_message_and_the_first_case_is_shown(visit):
     page = visit(where="#case=<b>%")
     page.wait_for_selector("#canvas[data-shown]")
     assert "This page holds no case <b>%;" in page.inner_text("#unknown").replace("%3Cb%3E", "<b>")

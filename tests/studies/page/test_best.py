@@ -110,7 +110,7 @@ def test_of_several_studies_the_best_body_counts_and_a_time_of_either():
         replace(good(), record=replace(good().record, status="diverged")),
     ],
 )
-def test_where_no_error_of_a_body_is_known_none_is_named(made):
+def test_a_body_without_an_error_is_not_named(made):
     assert best_bodies([made], named) == [] and answers([]) == {}
 
 

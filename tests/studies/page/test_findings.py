@@ -13,8 +13,8 @@ def row(body="tetrahedral", method="implicit_volume", **values):
 
 
 def loss(body, method, volume, force, mean=4.0, **values):
-    known = {"volume_worst [%]": volume, "force_end [%]": force, "force_end floor [%]": 0.2, "mean_error [%]": mean}
-    return row(body, method, **known, **{"mean_error floor [%]": 0.3}, **values)
+    errors = {"volume_worst [%]": volume, "force_end [%]": force, "force_end floor [%]": 0.2, "mean_error [%]": mean}
+    return row(body, method, **errors, **{"mean_error floor [%]": 0.3}, **values)
 
 
 TABLES = {
@@ -37,33 +37,33 @@ TABLES = {
 
 
 @pytest.fixture(scope="module")
-def told():
+def by_title():
     return {finding.title: finding for finding in findings(TABLES)}
 
 
-def test_volumes(told):
-    finding = told["How well volumes are kept"]
+def test_volumes(by_title):
+    finding = by_title["How well volumes are kept"]
     assert finding.number == "8.7 × 10⁻⁶ %" and "2 pairs" in finding.text
     assert "up to 18 % (ball, surface, 550 nodes)" in finding.text
 
 
-def test_forces_and_their_uncertainty(told):
-    one = told["Forces of bodies with one volume"]
+def test_forces_and_their_uncertainty(by_title):
+    one = by_title["Forces of bodies with one volume"]
     assert one.number == "−83.8 ± 0.2 %" and "−35.3 ± 0.2 % in tetrahedral bodies" in one.text
-    best = told["The force nearest to the reference"]
+    best = by_title["The force nearest to the reference"]
     assert best.number == "+1.1 ± 0.2 to −35.3 ± 0.2 %"
     assert "+1.1 ± 0.2 % in liver (quadratic, 550 nodes; mean displacement error 0.8 ± 0.3 %)" in best.text
 
 
-def test_times_and_their_spread(told):
-    cost = told["Cost of keeping a volume"]
+def test_times_and_their_spread(by_title):
+    cost = by_title["Cost of keeping a volume"]
     assert cost.number == "+25 ± 11 %" and "in 1 pair of runs" in cost.text and "In 0 pairs" in cost.text
     assert "0.25 ± 0.01 ms against 0.20 ± 0.01 ms" in cost.text
-    assert told["Speed"].number == "1 of 2" and "0.9 s" in told["Speed"].text
+    assert by_title["Speed"].number == "1 of 2" and "0.9 s" in by_title["Speed"].text
 
 
-def test_counts_of_the_map(told):
-    limit = told["The limit of the time step"]
+def test_counts_of_the_map(by_title):
+    limit = by_title["The limit of the time step"]
     assert limit.number == "1 of 2" and "above it 0 of 1 do not" in limit.text
 
 
@@ -74,36 +74,36 @@ def test_no_tables_no_findings():
     assert findings(empty) == [] and findings({"frame_rate": [row(), row(method="free")]}) == []
 
 
-def beside(*entries):
+def with_entries(*entries):
     """The same tables with rows of entries from outside in that of volumes."""
     return {**TABLES, "volume_loss": [*TABLES["volume_loss"], *({**row, "entry": True} for row in entries)]}
 
 
-def test_an_entry_is_told_where_it_is_the_best_of_its_scene_and_only_there():
+def test_an_entry_is_named_where_it_is_the_best_of_its_scene_and_only_there():
     best = loss("tetrahedral", "theirs", 5.0, -0.9, mean=5.0)
-    (finding,) = [one for one in findings(beside(best)) if one.title == "Results of other programs"]
+    (finding,) = [one for one in findings(with_entries(best)) if one.title == "Results of other programs"]
     assert finding.number == "1 of 3"  # force; neither mean displacement nor volume
-    told = "force of theirs in ball, −0.9 ± 0.2 % (ours at best −35.3 ± 0.2 %, ball, tetrahedral, 550 nodes by "
-    assert told + "implicit_volume)." in finding.text and finding.text.count(" of theirs in ") == 1
+    sentence = "force of theirs in ball, −0.9 ± 0.2 % (ours at best −35.3 ± 0.2 %, ball, tetrahedral, 550 nodes by "
+    assert sentence + "implicit_volume)." in finding.text and finding.text.count(" of theirs in ") == 1
     worse = loss("tetrahedral", "theirs", 5.0, -36.0, mean=5.0)
-    (finding,) = [one for one in findings(beside(worse)) if one.title == "Results of other programs"]
+    (finding,) = [one for one in findings(with_entries(worse)) if one.title == "Results of other programs"]
     assert finding.number == "0 of 3" and finding.text.endswith("and methods.")
     alone = loss("tetrahedral", "theirs", 5.0, -36.0, scene="spleen")
-    assert "force of theirs in spleen, −36.0 ± 0.2 %;" in findings(beside(alone))[-1].text
+    assert "force of theirs in spleen, −36.0 ± 0.2 %;" in findings(with_entries(alone))[-1].text
 
 
 def test_an_entry_changes_no_finding_on_ours():
     quick = {"real_time [s/s]": 1e-3, "frame_time [ms]": 9.0}
     strange = loss("tetrahedral", "theirs", 99.0, 500.0, **quick)
-    assert findings(beside(strange))[:-1] == findings(TABLES)
+    assert findings(with_entries(strange))[:-1] == findings(TABLES)
     limits = {**TABLES, "stability_map": [*TABLES["stability_map"], row(status="diverged", entry=True)]}
     assert findings(limits) == findings(TABLES)
 
 
 def test_no_more_entries_are_named_than_can_be_read():
     many = [loss("tetrahedral", "theirs", 1e-9, 0.5, mean=0.1, scene=f"scene{k}") for k in range(4)]
-    found = findings(beside(*many))[-1]
-    assert found.number == "12 of 12" and found.text.count(" of theirs in ") == 6 and "and 6 more" in found.text
+    finding = findings(with_entries(*many))[-1]
+    assert finding.number == "12 of 12" and finding.text.count(" of theirs in ") == 6 and "and 6 more" in finding.text
 
 
 CHANGES = {
@@ -115,6 +115,6 @@ CHANGES = {
 
 @pytest.mark.parametrize("name", TABLES)
 def test_a_number_that_moves_moves_its_finding(name):
-    """Nothing is told by heart."""
+    """No number is written into the text."""
     before, after = findings(TABLES), findings({**TABLES, name: [CHANGES[name](one) for one in TABLES[name]]})
     assert [one.title for one in before] == [one.title for one in after] and before != after

@@ -107,7 +107,7 @@ def test_dragging_turns_and_the_button_turns_back(visit):
     assert (picture(page) == front).all()
 
 
-def test_an_entry_from_outside_is_found_sorted_and_replayed_under_its_own_name(visit):
+def test_an_entry_from_outside_is_filtered_sorted_and_replayed_under_its_own_name(visit):
     page = visit()
     page.get_by_label("Filter").fill("entry")
     assert page.inner_text("#count") == "2 of 9 cases"
@@ -137,7 +137,7 @@ def test_an_entry_from_outside_is_found_sorted_and_replayed_under_its_own_name(v
     assert "it knows no caps" in page.inner_text("#about")
 
 
-def test_a_scene_that_compares_no_points_colours_none_and_an_early_end_is_told(visit):
+def test_a_scene_that_compares_no_points_colours_none_and_an_early_end_is_named(visit):
     page = visit()
     names = page.locator("#chosen option").all_inner_texts()
     page.locator("#chosen").select_option(label=next(name for name in names if name.startswith("ball squeeze · tetra")))

@@ -19,7 +19,7 @@ NAN = float("nan")
 
 
 def row(engine, scene, force, mean, cost, **more):
-    """Of an engine whose force is known to 0.5 %, and its displacement to 0.1 %."""
+    """Of an engine: the uncertainty of its force is 0.5 %, that of its displacement 0.1 %."""
     values = {
         "force_end": (force, 0.5),
         "mean_error": (mean, 0.1),
@@ -45,33 +45,34 @@ ROWS = [
 
 
 SVG = '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 9 9"><g/></svg>'
-ASKED = {("ball_squeeze", "force_end"): 0.5, ("liver_press", "force_end"): 0.5, ("liver_press", "mean_error"): 0.1}
+BARS = {("ball_squeeze", "force_end"): 0.5, ("liver_press", "force_end"): 0.5, ("liver_press", "mean_error"): 0.1}
 
 
 def test_pairs_are_those_of_the_open_scenes_with_the_bars_of_their_references():
     """A ball between planes may turn: its displacement is no pair."""
-    asked = pairs()
-    assert len(asked) == 9 and ("ball_squeeze", "mean_error") not in asked
-    known = published(LIVER_PRESS)
-    assert known is not None
-    told = json.loads((known.file.parent / "set.json").read_text())["references"]["liver_press"]["relative bars"]
-    assert asked["liver_press", "force_end"] == pytest.approx(100 * told["force_end"])
-    assert asked["liver_press", "mean_error"] == pytest.approx(100 * told["surface_mean"])
+    bars = pairs()
+    assert len(bars) == 9 and ("ball_squeeze", "mean_error") not in bars
+    reference = published(LIVER_PRESS)
+    assert reference is not None
+    references = json.loads((reference.file.parent / "set.json").read_text())["references"]
+    published_bars = references["liver_press"]["relative bars"]
+    assert bars["liver_press", "force_end"] == pytest.approx(100 * published_bars["force_end"])
+    assert bars["liver_press", "mean_error"] == pytest.approx(100 * published_bars["surface_mean"])
 
 
 def test_a_profile_is_counted_by_hand():
     """Of three pairs, a has the force of the ball for 0.5, the displacement for 2, the force of the liver for 20."""
-    assert profile(ROWS, "a", 1.0, ASKED) == [(0.5, 1 / 3), (2.0, 2 / 3), (20.0, 1.0)]
-    assert profile(ROWS, "a", 3.0, ASKED) == [(0.5, 1 / 3), (2.0, 2 / 3), (2.0, 1.0)]
-    assert profile(ROWS, "b", 3.0, ASKED) == []
-    assert profile(ROWS, "mine", 1.0, ASKED) == [(1.0, 1 / 3)] and profile(ROWS, "mine", 3.0, ASKED)[-1] == (1.0, 2 / 3)
-    assert profile(ROWS, "a", 1.0, ASKED, COUNT) == []
+    assert profile(ROWS, "a", 1.0, BARS) == [(0.5, 1 / 3), (2.0, 2 / 3), (20.0, 1.0)]
+    assert profile(ROWS, "a", 3.0, BARS) == [(0.5, 1 / 3), (2.0, 2 / 3), (2.0, 1.0)]
+    assert profile(ROWS, "b", 3.0, BARS) == []
+    assert profile(ROWS, "mine", 1.0, BARS) == [(1.0, 1 / 3)] and profile(ROWS, "mine", 3.0, BARS)[-1] == (1.0, 2 / 3)
+    assert profile(ROWS, "a", 1.0, BARS, COUNT) == []
 
 
 def test_no_tolerance_is_finer_than_the_reference():
-    """A force within 0.01 of 3 % cannot be told where the reference is known to 0.5 %."""
+    """0.01 of 3 % is less than the uncertainty of the reference, 0.5 %."""
     assert tolerance("force_end", 0.01, 0.5) == 0.5 and tolerance("force_end", 1.0, 0.5) == 3.0
-    assert profile(ROWS, "mine", 0.01, ASKED) == [(1.0, 1 / 3)]
+    assert profile(ROWS, "mine", 0.01, BARS) == [(1.0, 1 / 3)]
 
 
 def test_cards_say_the_range_and_the_reasons():
@@ -140,11 +141,11 @@ def test_the_page_fits_a_window_and_asks_for_nothing(browser, tmp_path, width):
     file = tmp_path / "league.html"
     file.write_text(made_page(), encoding="utf-8")
     context = browser.new_context(offline=True, viewport={"width": width, "height": 900})
-    shown, asked, complaints = context.new_page(), [], []
-    shown.on("request", lambda request: asked.append(request.url))
+    shown, requests, complaints = context.new_page(), [], []
+    shown.on("request", lambda request: requests.append(request.url))
     shown.on("console", lambda message: complaints.append(message.text))
     shown.goto(file.as_uri())
     assert shown.evaluate("document.documentElement.scrollWidth") <= width
     assert shown.locator(".cards > li").count() == 3 and shown.locator(".cards .entry").all_inner_texts() == ["ours"]
-    assert asked == [file.as_uri()] and complaints == []
+    assert requests == [file.as_uri()] and complaints == []
     context.close()

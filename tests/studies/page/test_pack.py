@@ -36,11 +36,11 @@ def test_a_body_that_flies_away_is_packed_coarser_and_never_wrong():
 )
 def test_series_come_back(values):
     given = np.array(values, dtype=float)
-    found = unpack_series(pack_series(given))
-    known = np.isfinite(given)
-    assert np.array_equal(np.isfinite(found), known)
-    span = np.ptp(given[known]) if known.any() else 0.0
-    assert np.all(np.abs(found[known] - given[known]) <= span / 131_000)
+    series = unpack_series(pack_series(given))
+    finite = np.isfinite(given)
+    assert np.array_equal(np.isfinite(series), finite)
+    span = np.ptp(given[finite]) if finite.any() else 0.0
+    assert np.all(np.abs(series[finite] - given[finite]) <= span / 131_000)
 
 
 def test_a_thinned_history_keeps_its_ends_and_peaks():

@@ -35,23 +35,23 @@ class Parsed(HTMLParser):
 
     def __init__(self, text):
         super().__init__()
-        self.found, self.open, self.wrong = [], [], []
+        self.elements, self.open, self.wrong = [], [], []
         self.feed(text)
 
     def handle_starttag(self, tag, attrs):
-        self.found.append((tag, dict(attrs)))
+        self.elements.append((tag, dict(attrs)))
         if tag not in VOID:
             self.open.append(tag)
 
     def handle_startendtag(self, tag, attrs):
-        self.found.append((tag, dict(attrs)))
+        self.elements.append((tag, dict(attrs)))
 
     def handle_endtag(self, tag):
         if not self.open or self.open.pop() != tag:
             self.wrong.append(tag)
 
     def ids(self):
-        return [attributes["id"] for _, attributes in self.found if "id" in attributes]
+        return [attributes["id"] for _, attributes in self.elements if "id" in attributes]
 
 
 @pytest.fixture(scope="module")
@@ -88,14 +88,14 @@ def test_it_is_whole_html_with_names_that_are_there_once(parsed):
     assert parsed.wrong == [] and parsed.open == []
     ids = parsed.ids()
     assert len(ids) == len(set(ids))
-    for _, attributes in parsed.found:
+    for _, attributes in parsed.elements:
         for name in ("aria-labelledby", "aria-controls", "aria-describedby", "for"):
             assert set((attributes.get(name) or "").split()) <= set(ids), attributes
 
 
 def test_nothing_comes_from_elsewhere(page, parsed):
     names = ("src", "href", "xlink:href")
-    links = [attributes[name] for _, attributes in parsed.found for name in names if name in attributes]
+    links = [attributes[name] for _, attributes in parsed.elements for name in names if name in attributes]
     assert links and all(link.startswith(("#", "data:")) for link in links)
     inside = [link for link in links if link.startswith("#")]
     cases = {link.removeprefix("#case=") for link in inside if link.startswith("#case=")}
@@ -115,7 +115,7 @@ def test_no_script_runs_but_its_own(page):
 
 def test_no_name_or_text_can_break_it(page, parsed):
     assert NASTY not in page[1] and "<img" not in page[1]
-    assert [tag for tag, _ in parsed.found].count("script") == 2
+    assert [tag for tag, _ in parsed.elements].count("script") == 2
     assert any(NASTY in case["about"] for case in data_of(page[1])["cases"].values())
 
 
@@ -128,7 +128,7 @@ def test_json_in_a_script_is_no_markup_and_reads_back(text):
 def test_all_cases_are_in_the_table_once_and_all_rows_in_the_csv(page, parsed):
     table = page[1][page[1].index('<table id="cases">') : page[1].rindex("</table>")]
     assert table.count("<tr>") - 1 == len(losses()) + len(theirs())  # those of the other study are the same cases
-    link = next(attributes["href"] for _, attributes in parsed.found if attributes.get("id") == "csv")
+    link = next(attributes["href"] for _, attributes in parsed.elements if attributes.get("id") == "csv")
     rows = pd.read_csv(io.BytesIO(base64.b64decode(link.split(",", 1)[1])))
     assert len(rows) == len(losses()) + len(rates()) + 2 * len(theirs())
     assert set(rows["method"][rows["entry"]]) == {"theirs-half_step", "unable"}
@@ -281,12 +281,12 @@ def test_commands_name_the_file_of_an_own_study(kept, tmp_path, monkeypatch):
     root = shutil.copytree(kept[0], tmp_path / "kept")
     own = replace(kept[1][0], word="my rod.py")
     write_part(root, own, losses(), study_table(losses(), COLUMNS), {})
-    asked = []
-    monkeypatch.setattr(module, "answers", lambda best, scenes: asked.append((best, scenes)) or {})
+    calls = []
+    monkeypatch.setattr(module, "answers", lambda best, scenes: calls.append((best, scenes)) or {})
     path, _ = write_page(root, [own, kept[1][1]])
     assert path is not None
     # Its scenes are answered for, and come first.
-    best, scenes = asked[-1]
+    best, scenes = calls[-1]
     assert scenes == {run.case.scene.name for run in losses()} and best[0]["scene"] in scenes
     text = path.read_text(encoding="utf-8")
     assert "organbench run &#39;my rod.py&#39; frame_rate" in text and "organbench report &#39;my rod.py&#39;" in text
@@ -294,7 +294,7 @@ def test_commands_name_the_file_of_an_own_study(kept, tmp_path, monkeypatch):
     assert len(runs) == len(losses()) and all(run.startswith("organbench run 'my rod.py' --case ") for run in runs)
 
 
-def test_a_chart_that_keeps_no_svg_is_left_out_and_said(results):
+def test_a_chart_that_keeps_no_svg_is_left_out_with_a_remark(results):
     study = tiny_study(charts=(Chart("own.png", lambda runs, path: path.write_bytes(b"own")),))
     assert any("chart own.png is omitted" in remark for remark in report(Ledger(results), [study])[1])
 

@@ -35,8 +35,8 @@ def test_the_table_sorts_by_size_of_errors_with_what_is_unknown_last(visit):
         page.keyboard.press("Enter")
         assert head.get_attribute("aria-sort") == word
         cells = [cell.split("±")[0].replace("−", "-").replace("†", "") for cell in column(page, number)]
-        known = [abs(float(cell)) for cell in cells if cell.strip() != "–"]
-        assert len(known) == 6 and known == sorted(known)[::order] and cells[6:] == ["–"] * 3
+        sizes = [abs(float(cell)) for cell in cells if cell.strip() != "–"]
+        assert len(sizes) == 6 and sizes == sorted(sizes)[::order] and cells[6:] == ["–"] * 3
     page.locator("#cases thead th:nth-child(1) button").click()
     assert head.get_attribute("aria-sort") is None and "onerror" in column(page, 1)[0]
     kinds = [cell.split("\n")[1].strip() for cell in column(page, 1)[1:7]]
@@ -106,10 +106,10 @@ def test_all_that_can_be_operated_has_a_name(visit):
     session = page.context.new_cdp_session(page)
     nodes = session.send("Accessibility.getFullAXTree")["nodes"]
     named = {"button", "slider", "searchbox", "combobox", "tab", "link", "checkbox", "image", "region", "tabpanel"}
-    found = [(n["role"]["value"], n.get("name", {}).get("value", "")) for n in nodes if not n.get("ignored")]
-    assert {role for role, _ in found} >= named - {"image"}
-    assert [role for role, name in found if role in named and not name.strip()] == []
-    assert any(name.startswith("ball clamped") and "its reference, right" in name for _, name in found)
+    elements = [(n["role"]["value"], n.get("name", {}).get("value", "")) for n in nodes if not n.get("ignored")]
+    assert {role for role, _ in elements} >= named - {"image"}
+    assert [role for role, name in elements if role in named and not name.strip()] == []
+    assert any(name.startswith("ball clamped") and "its reference, right" in name for _, name in elements)
 
 
 def test_a_narrow_window_scrolls_down_alone(visit):

@@ -63,10 +63,10 @@ def bad_and_good():
 
 
 def test_judgements_are_held_against_the_reference():
-    found = judgements(bad_and_good())
-    assert [one.within for one in found] == [True, True, False, False, True]
-    assert [one.trusted for one in found] == [True, True, False, True, False]
-    assert tally(found) == (2, 1, 3, 1)
+    verdicts = judgements(bad_and_good())
+    assert [one.within for one in verdicts] == [True, True, False, False, True]
+    assert [one.trusted for one in verdicts] == [True, True, False, True, False]
+    assert tally(verdicts) == (2, 1, 3, 1)
 
 
 def with_fewer_nodes(runs):
@@ -78,9 +78,9 @@ def with_fewer_nodes(runs):
 
 def test_bodies_with_fewer_nodes_are_never_trusted_and_those_that_are_alike_and_wrong_are_counted():
     coarse = with_fewer_nodes(bad_and_good())
-    found = judgements(coarse)
-    assert not any(one.trusted for one in found)
-    assert [one.alike for one in found] == [True, True, False, True, False]
+    verdicts = judgements(coarse)
+    assert not any(one.trusted for one in verdicts)
+    assert [one.alike for one in verdicts] == [True, True, False, True, False]
     assert trust_of(coarse).splitlines()[-1] == "| all | – | – | – | – | 2, 1 |"
 
 

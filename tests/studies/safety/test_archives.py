@@ -48,8 +48,8 @@ def test_nothing_but_regular_files_of_the_folder_is_opened(refused, tmp_path, ki
         file.mkdir()
     else:
         file.symlink_to({"device": "/dev/zero", "link": "/proc/self/status", "link above": "../secret"}[kind])
-    said = "leads outside" if kind.startswith("link") else "is not a regular file"
-    assert f"{named} is" in (sentence := refused("archive", "--check", path)) and said in sentence
+    reason = "leads outside" if kind.startswith("link") else "is not a regular file"
+    assert f"{named} is" in (sentence := refused("archive", "--check", path)) and reason in sentence
 
 
 def test_a_large_manifest_is_not_read_to_its_end(refused, tmp_path):

@@ -23,12 +23,12 @@ def calls(file):
 
 
 def test_who_unpickles_or_evaluates_is_listed():
-    found = {}
+    callers = {}
     for file in (file for package in PACKAGES for file in sorted((ROOT / package).rglob("*.py"))):
         names = {name for name, _ in calls(file)} & DANGEROUS
         if names:
-            found[file.relative_to(ROOT).as_posix()] = names
-    assert found == ALLOWED
+            callers[file.relative_to(ROOT).as_posix()] = names
+    assert callers == ALLOWED
 
 
 def test_arrays_and_settings_are_read_without_objects():

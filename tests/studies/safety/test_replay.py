@@ -55,7 +55,7 @@ def test_it_runs_when_the_user_names_it_and_its_digest_fits(organbench, refused,
     assert (tmp_path / "marker").exists()
 
 
-def test_no_file_runs_before_the_digests_of_all_are_known(refused, results, evil, tmp_path):
+def test_no_file_runs_before_the_digests_of_all_are_checked(refused, results, evil, tmp_path):
     file, sha256 = evil
     other = tmp_path / "other.py"
     other.write_text("x = 1\n")

@@ -20,7 +20,7 @@ CUT = Cut("slit", MIDDLE, BallRegion((0.0, 0.0, 0.0), 0.01), at=1.0)
 
 
 def test_scenes_without_a_cut_keep_their_keys():
-    """Keys of stored runs and of published references: no word of cuts is in them, and every reference is found."""
+    """Keys of stored runs and of published references: no word of cuts is in them, and every reference is there."""
     assert all('"cuts"' not in case.key for study in STUDIES for case in study.cases if not case.scene.cuts)
     assert all(published(scene) is not None for scene in JUDGED if not scene.cuts)
 

@@ -45,7 +45,7 @@ def test_a_moved_file_keeps_its_results_and_an_edited_one_does_not(tmp_path):
     assert why_stale(root, other, "own") == MISSING and key_digest(other.key) != key_digest(same.key)
 
 
-def test_references_are_known_by_content_too(tmp_path):
+def test_paths_of_references_follow_the_content_too(tmp_path):
     plan = ReferencePlan()
     solves = []
     for name, edge in (("a", 0.1), ("b", 0.1), ("c", 0.11)):

@@ -26,7 +26,7 @@ EQUILIBRIA = {"liver_press": (-2.7, -2.4, 0.4, 0.8, 1.2), "liver_probe": (4.8, -
 """Scene -> what the force is above the reference at each checkpoint when nothing drags [%]."""
 
 
-def told() -> dict[str, list[float]]:
+def published_rows() -> dict[str, list[float]]:
     """Scene -> the numbers of its row."""
     page = (ROOT / "docs/accuracy.md").read_text(encoding="utf-8")
     part = page.split("## Force along the path\n")[1].split("\n## ")[0]
@@ -68,8 +68,8 @@ def run(scene: Scene, damping: float, times: int = 1) -> tuple[np.ndarray, Recor
 def test_the_errors_of_adaptive_bodies_are_the_published_ones():
     page = " ".join((ROOT / "docs/accuracy.md").read_text(encoding="utf-8").split())
     (sentence,) = re.findall(r"their force_error is .*?, where drag remains", page)
-    found = re.findall(r"([\d.]+) % for (\w+)", sentence)
-    numbers, names = zip(*found, strict=True)
+    pairs = re.findall(r"([\d.]+) % for (\w+)", sentence)
+    numbers, names = zip(*pairs, strict=True)
     assert set(names) == {scene.name for scene in SCENES}
     table = pd.read_csv(ROOT / "results/published/accuracy/accuracy.csv")
     for name, number in zip(names, numbers, strict=True):
@@ -99,7 +99,7 @@ def test_errors_and_drag_are_what_the_table_says(scene, mesh_cache, tmp_path):
     dragged, slow, (calm, record) = run(scene, MORE)[0], run(scene, MORE, 2)[0], run(scene, scene.damping)
     if scene.name in EQUILIBRIA:
         assert 100 * (still / truth - 1) == pytest.approx(EQUILIBRIA[scene.name], abs=0.2)
-    found = [apart(force, truth) for force in (dragged, calm, still)]
-    found += [apart(force, still) for force in (dragged, slow, calm)]
-    found += [100 * float(calm[-1] / dragged[-1] - 1), 100 * float(record.attributes["sway"])]
-    assert found == pytest.approx(told()[scene.name], abs=0.1)
+    row = [apart(force, truth) for force in (dragged, calm, still)]
+    row += [apart(force, still) for force in (dragged, slow, calm)]
+    row += [100 * float(calm[-1] / dragged[-1] - 1), 100 * float(record.attributes["sway"])]
+    assert row == pytest.approx(published_rows()[scene.name], abs=0.1)

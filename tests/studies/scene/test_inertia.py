@@ -31,7 +31,7 @@ def test_scenes_whose_reference_is_a_load_path_allow_any_masses(scene):
 
 
 @pytest.mark.parametrize(
-    ("scene", "told"),
+    ("scene", "reason"),
     [
         (BALL_RINGING, "rings"),
         (STRESS_SCENES[0], "out of shape"),
@@ -44,8 +44,8 @@ def test_scenes_whose_reference_is_a_load_path_allow_any_masses(scene):
     ],
     ids=lambda value: value if isinstance(value, str) else "",
 )
-def test_scenes_in_which_bodies_swing_or_are_hit_do_not(scene, told):
-    assert told in str(why_inertia_matters(scene))
+def test_scenes_in_which_bodies_swing_or_are_hit_do_not(scene, reason):
+    assert reason in str(why_inertia_matters(scene))
 
 
 def test_a_plane_that_rests_on_its_way_does_not_turn():

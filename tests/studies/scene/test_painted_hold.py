@@ -44,9 +44,9 @@ def test_both_solvers_hold_what_is_painted(scene):
     cap = 2 * np.pi * RADIUS**2 * (1 - CAP)
     for number, one in enumerate(scene.held):
         patch = patch_nodes(mesh, one.name, one.region)
-        for found in (heights(mesh.points, patch), heights(nodes(fine), held[number])):
+        for ratio in (heights(mesh.points, patch), heights(nodes(fine), held[number])):
             # A third of an edge of the file is 2 % of the height; an edge of the mesh reaches to the top of the cap.
-            assert 0.98 < found.min() < 1.02 and (found < 1.02).sum() >= 9
+            assert 0.98 < ratio.min() < 1.02 and (ratio < 1.02).sum() >= 9
         assert mesh.points[patch, 2].sum() * (1 if one.name == "top" else -1) > 0
         corners = mesh.points[mesh.patch_triangles(one.name)]
         area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1).sum() / 2

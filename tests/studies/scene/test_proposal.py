@@ -29,14 +29,14 @@ def test_axes_hold_and_palpation_follow_the_rules():
     turn = np.linalg.qr(np.random.default_rng(2).normal(size=(3, 3)))[0]
     turn *= np.linalg.det(turn)
     points, faces = egg(taper=0.4)
-    found = proposal(body_of(points @ turn.T + 0.3, faces))
-    axis = np.asarray(found.axes[0])
-    assert abs(axis @ turn[:, 0]) > 0.999 and found.sides[0] == pytest.approx(0.060, rel=0.01)
+    plan = proposal(body_of(points @ turn.T + 0.3, faces))
+    axis = np.asarray(plan.axes[0])
+    assert abs(axis @ turn[:, 0]) > 0.999 and plan.sides[0] == pytest.approx(0.060, rel=0.01)
     # The blunter end is at low x; a tenth of the surface is held there, and the normal looks to the middle.
-    assert np.asarray(found.hold.normal) @ turn[:, 0] > 0.999 and found.held_share == pytest.approx(HELD, abs=0.01)
-    assert (found.hold.level(np.array([turn @ (-0.030, 0, 0) + 0.3])) < 0).all()
-    point, normal = (np.asarray(v) for v in (found.palpation.point, found.palpation.normal))
-    assert found.hold.level(point[None])[0] > 0.4 * found.sides[0]
+    assert np.asarray(plan.hold.normal) @ turn[:, 0] > 0.999 and plan.held_share == pytest.approx(HELD, abs=0.01)
+    assert (plan.hold.level(np.array([turn @ (-0.030, 0, 0) + 0.3])) < 0).all()
+    point, normal = (np.asarray(v) for v in (plan.palpation.point, plan.palpation.normal))
+    assert plan.hold.level(point[None])[0] > 0.4 * plan.sides[0]
     # The flattest side of the egg is that of its shortest axis; nothing of the body lies beyond.
     assert abs(normal @ turn[:, 2]) > 0.9 and ((points @ turn.T + 0.3 - point) @ normal).max() < 0.0015
 
@@ -111,7 +111,7 @@ def test_a_tissue_is_taken_from_a_name_that_tells_one():
             tissue_named(name)
 
 
-def test_a_body_without_a_free_patch_is_told():
+def test_a_body_without_a_free_patch_is_an_error():
     points, faces = egg()
     inside_out = body_of(points, faces[:, ::-1])
     with pytest.raises(StudyError, match="egg: no freely reachable patch lies far from its clamped end"):

@@ -127,9 +127,9 @@ def test_what_is_new_changed_or_gone_is_seen(many, opened):
     opened.clear()
     assert ledger.files(NAME) is before, "a command sees the folder as it was"
     ledger.look_again()
-    for found in (ledger.files(NAME), entries(many)):
-        assert found[first.name].status == "diverged" and third.name not in found
-        assert found["copy.h5"].digest == found[second.name].digest
+    for files in (ledger.files(NAME), entries(many)):
+        assert files[first.name].status == "diverged" and third.name not in files
+        assert files["copy.h5"].digest == files[second.name].digest
         assert sorted(opened) == sorted(["copy.h5", first.name])
 
 
@@ -183,7 +183,7 @@ def test_a_result_under_another_name_is_not_the_case(results):
     assert Ledger(results).why(job) == MISSING
 
 
-def test_a_result_is_wanted_once_in_many_studies(tmp_path):
+def test_a_result_is_one_job_in_many_studies(tmp_path):
     twice = replace(STUDY, cases=(*STUDY.cases, *STUDY.cases))
     assert len(jobs_of(tmp_path, [twice])) == COUNT
     assert len(jobs_of(tmp_path, [STUDY, replace(STUDY, name="other")])) == 2 * COUNT
@@ -219,7 +219,7 @@ def test_status_check_reads_every_byte(organbench, many):
     assert f"{COUNT - 1} ok, 1 stale" in organbench("status", study, "--results", many)[1]
 
 
-def test_lost_bits_are_found_by_the_first_reader_and_then_known_to_all(many):
+def test_the_first_reader_marks_lost_bits_for_all(many):
     path = record_files(many, NAME)[0]
     statuses(many)
     lose_silently(many, path)
@@ -295,9 +295,9 @@ def test_where_no_ledger_can_be_written_it_is_in_memory_and_many_files_are_a_war
     monkeypatch.setattr(module, "MANY", COUNT - 1)
     ledger = Ledger(many)
     with pytest.warns(UserWarning, match=f"cannot be written .*reads all {COUNT} files"):
-        found = ledger.files(NAME)
-    assert {entry.status for entry in found.values()} == {"ok"} and len(found) == COUNT
-    assert ledger.files(NAME) is found
+        files = ledger.files(NAME)
+    assert {entry.status for entry in files.values()} == {"ok"} and len(files) == COUNT
+    assert ledger.files(NAME) is files
 
 
 def test_commands_at_once_find_the_same(many):
@@ -308,8 +308,8 @@ def test_commands_at_once_find_the_same(many):
     command = [sys.executable, "-W", "error", "-c", program, str(many)]
     others = [subprocess.Popen(command, env=env, stdout=subprocess.PIPE, text=True) for _ in range(2)]
     with ThreadPoolExecutor(8) as pool:
-        found = list(pool.map(lambda _: entries(many), range(16)))
-    assert all(one == found[0] for one in found) and len(found[0]) == COUNT
+        listings = list(pool.map(lambda _: entries(many), range(16)))
+    assert all(one == listings[0] for one in listings) and len(listings[0]) == COUNT
     assert [other.communicate()[0] for other in others] == [f"{COUNT}\n"] * 2
 
 
@@ -324,8 +324,8 @@ def test_two_writers_keep_the_lines_of_both(many, opened):
     two.look_again()
     two.files(NAME)
     opened.clear()
-    found = entries(many)
-    assert [found[path.name].status for path in (first, second)] == ["diverged"] * 2 and opened == []
+    files = entries(many)
+    assert [files[path.name].status for path in (first, second)] == ["diverged"] * 2 and opened == []
 
 
 def test_a_kept_row_is_the_row_of_the_run(results):
@@ -345,9 +345,9 @@ def test_one_changed_record_is_one_measured_row(many, opened):
     changed, kept = made_up_run.run(volume=(1.0, 1.5, 1.0, 1.0)).record, read_record(path)
     write_record(path, replace(changed, key=kept.key, name=kept.name, fingerprint=kept.fingerprint))
     opened.clear()
-    found = rows(many)
+    table = rows(many)
     assert opened == [path.name] * 2  # for its line, and for its metrics
-    assert sorted(row["volume_worst [%]"] for row in found)[-2:] == [0.0, pytest.approx(50.0)]
+    assert sorted(row["volume_worst [%]"] for row in table)[-2:] == [0.0, pytest.approx(50.0)]
 
 
 def test_rows_are_measured_again_for_other_metrics_and_a_changed_reference(many, monkeypatch):
@@ -361,20 +361,20 @@ def test_rows_are_measured_again_for_other_metrics_and_a_changed_reference(many,
 
 
 def test_measured_values_are_kept_for_a_few_sets_and_go_with_their_files(many):
-    ledger, asked = Ledger(many), []
+    ledger, calls = Ledger(many), []
     files = dict.fromkeys(ledger.files(NAME), "code")
 
     def measure(file):
-        asked.append(file)
+        calls.append(file)
         return None if file == min(files) else len(file)
 
     for number in range(SETS + 2):
         assert len(ledger.measured(NAME, f"set {number}", files, measure)) == COUNT - 1
-    asked.clear()
+    calls.clear()
     ledger.measured(NAME, f"set {SETS + 1}", files, measure)
-    assert asked == [min(files)], "no value is not kept"
+    assert calls == [min(files)], "no value is not kept"
     ledger.measured(NAME, "set 0", files, measure)
-    assert len(asked) == 1 + COUNT, "the oldest sets are gone"
+    assert len(calls) == 1 + COUNT, "the oldest sets are gone"
     record_files(many, NAME)[1].unlink()
     entries(many)
     with closing(sqlite3.connect(ledger.path)) as database:

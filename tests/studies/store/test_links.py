@@ -29,7 +29,7 @@ def shown(tree) -> str:
     return capture.get()
 
 
-def test_paths_are_readable_and_told_apart_by_the_case(tmp_path):
+def test_paths_are_readable_and_differ_by_the_case(tmp_path):
     path = record_path(tmp_path, "volume_loss", "ball / free, dt=0.5·dt_c", '{"dt": 1, "m": 2}')
     assert path.parent == tmp_path / "volume_loss"
     other_order = '{"m": 2, "dt": 1}'

@@ -41,12 +41,12 @@ def test_every_letter_is_explained(kind):
 
 
 def test_fields_are_read_by_names_of_the_tables():
-    known = {name for fields, _ in LAYOUTS.values() for name in fields}
+    names = {name for fields, _ in LAYOUTS.values() for name in fields}
     read = set()
     for file in (REPOSITORY / "studies").rglob("*.py"):
-        read |= {"".join(found) for found in BY_NAME.findall(file.read_text(encoding="utf-8"))}
+        read |= {"".join(groups) for groups in BY_NAME.findall(file.read_text(encoding="utf-8"))}
     assert {"volume", "snapshots", "frame_ns", "displacement"} <= read
-    assert read <= known
+    assert read <= names
 
 
 def test_a_made_up_run_is_as_its_table_says():
@@ -66,7 +66,7 @@ def test_what_a_run_writes_is_what_its_tables_list(finished_sweep):
         "league",
         "portable",
         "restamped",
-    }  # where asked for
+    }  # with an option
     timing = read_record(timing_file(finished_sweep, "tiny", tiny_case(timed=True)))
     assert set(timing.fields) == set(LAYOUTS["timing"][0])
     assert set(timing.attributes) == set(LAYOUTS["timing"][1]) - {"restamped"}

@@ -38,9 +38,9 @@ def with_edit(monkeypatch, module: str, fingerprint) -> str:
     source_fingerprint.cache_clear()
     with monkeypatch.context() as changed:
         changed.setattr(sources, "_source", edited)
-        found = fingerprint()
+        number = fingerprint()
     source_fingerprint.cache_clear()
-    return found
+    return number
 
 
 @pytest.mark.parametrize(

@@ -146,10 +146,10 @@ def test_a_record_that_is_not_as_its_table_says_is_not_written(tmp_path):
         ),
         "contains a null byte": replace(stored, name="a\0b"),
     }
-    for told, one in odd.items():
+    for message, one in odd.items():
         with pytest.raises(StudyError) as problem:
             write_record(tmp_path / "a.h5", one)
-        assert told in str(problem.value)
+        assert message in str(problem.value)
     assert list(tmp_path.iterdir()) == []
 
 

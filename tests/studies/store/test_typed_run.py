@@ -26,17 +26,17 @@ def test_every_line_of_the_tables_is_a_name_of_the_run(path):
     run, record = Run.load(path), read_record(path)
     assert run.case == tiny_case() and run.reference is None and run.timing is None
     for name, line in RUN_FIELDS.items():
-        found = getattr(run.fields, name)
+        value = getattr(run.fields, name)
         assert getattr(RunFields, name) is line and line.name == name
         if name in record.fields:
-            assert np.array_equal(found, record.fields[name].values, equal_nan=True), name
-            assert line.unit == record.fields[name].unit and found.ndim == len(line.shape.split())
+            assert np.array_equal(value, record.fields[name].values, equal_nan=True), name
+            assert line.unit == record.fields[name].unit and value.ndim == len(line.shape.split())
         else:
-            assert line.optional and found is None, name
+            assert line.optional and value is None, name
     for name, line in RUN_ATTRIBUTES.items():
-        found = getattr(run.attributes, name)
-        assert getattr(RunAttributes, name) is line and found is run.record.attributes.get(name)
-        assert isinstance(found, TYPES[line.kind]) or (found is None and line.optional), name
+        value = getattr(run.attributes, name)
+        assert getattr(RunAttributes, name) is line and value is run.record.attributes.get(name)
+        assert isinstance(value, TYPES[line.kind]) or (value is None and line.optional), name
 
 
 def test_the_document_reads_a_run(path, capsys):

@@ -60,8 +60,8 @@ def nodal_of(record: Record, step: int) -> dict[str, np.ndarray]:
 def histories_of(record: Record) -> dict[str, np.ndarray]:
     """What has as many rows as `t`, and none per node."""
     rows, others = len(values(record, "t")), ("snapshots", "displacement", "snapshot_frame")
-    found = {name: values(record, name) for name in record.fields if name not in others}
-    return {name: each.reshape(rows, -1) for name, each in found.items() if len(each) == rows and each.size}
+    fields = {name: values(record, name) for name in record.fields if name not in others}
+    return {name: each.reshape(rows, -1) for name, each in fields.items() if len(each) == rows and each.size}
 
 
 def test_vtk_reads_every_step_to_the_last_bit(stored):
@@ -81,11 +81,11 @@ def test_vtk_reads_every_step_to_the_last_bit(stored):
         exact(support.vtk_to_numpy(read.GetCells().GetConnectivityArray()), cells.ravel().astype(np.int64))
         exact(support.vtk_to_numpy(read.GetCells().GetOffsetsArray()), cells.shape[1] * np.arange(len(cells) + 1))
         assert {read.GetCellType(k) for k in range(len(cells))} == {{3: 5, 4: 10}[cells.shape[1]]}
-        for data, wanted in (
+        for data, arrays in (
             (read.GetPointData(), nodal_of(record, step)),
             (read.GetFieldData(), histories_of(record)),
         ):
-            for name, each in wanted.items():
+            for name, each in arrays.items():
                 exact(support.vtk_to_numpy(data.GetArray(name)).reshape(each.shape), each)
 
 

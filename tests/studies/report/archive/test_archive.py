@@ -108,7 +108,7 @@ def test_equal_results_are_equal_bytes(packed, finished_sweep, tmp_path):
     assert [path.name for path in tmp_path.iterdir()] == ["again.zip"]
 
 
-def test_a_whole_archive_is_said_to_be_one(organbench, packed, unpacked):
+def test_a_whole_archive_passes_the_check(organbench, packed, unpacked):
     count = check(packed)
     assert check(unpacked) == count > 500
     assert organbench("archive", "--check", packed)[:2] == (0, f"{packed}: {count} files, each as it was packed\n")
@@ -158,7 +158,7 @@ def test_an_archive_is_cited_as_the_repository(unpacked):
     assert root["license"] == {"@id": f"https://spdx.org/licenses/{cited['license']}"}
 
 
-def test_the_citation_is_found_next_to_the_code_of_an_archive(tmp_path, monkeypatch):
+def test_the_citation_lies_next_to_the_code_of_an_archive(tmp_path, monkeypatch):
     monkeypatch.setattr(crate, "ROOT", tmp_path / "code")
     (tmp_path / "CITATION.cff").write_text("")
     assert crate.citation_file() == tmp_path / "CITATION.cff"

@@ -19,8 +19,8 @@ def test_a_file_that_is_missing_or_changed_is_named(refused, unpacked):
     path = case_path(unpacked, "tiny", tiny_case())
     content = path.read_bytes()
     path.write_bytes(content[:-1] + b"?")
-    said = refused("archive", "--check", unpacked)
-    assert f"tiny/{path.name} has changed since it was packed: get the archive again" in said
+    sentence = refused("archive", "--check", unpacked)
+    assert f"tiny/{path.name} has changed since it was packed: get the archive again" in sentence
     path.unlink()
     assert f"{unpacked} lacks tiny/{path.name}" in refused("archive", "--check", unpacked)
     runs, remarks = load_runs(unpacked, STUDY)
@@ -54,13 +54,13 @@ def test_what_is_no_archive_is_one_sentence(refused, tmp_path):
 def test_what_is_missing_damaged_or_stale_is_not_packed(results, tmp_path):
     path, target = case_path(results, "tiny", tiny_case()), tmp_path / "new.zip"
     record = read_record(path)
-    for spoil, said in (
+    for spoil, reason in (
         (lambda: write_record(path, replace(record, fingerprint="0")), "is stale"),
         (lambda: path.write_bytes(path.read_bytes()[:-9]), "is stale"),
         (path.unlink, "is missing"),
     ):
         spoil()
-        with pytest.raises(StudyError, match=rf"not archived: {tiny_case().name} {said}.*organbench run tiny"):
+        with pytest.raises(StudyError, match=rf"not archived: {tiny_case().name} {reason}.*organbench run tiny"):
             pack(results, [STUDY], target, DAY)
     assert not target.exists() and not list(tmp_path.glob("new-*"))
 

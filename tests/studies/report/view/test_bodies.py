@@ -16,7 +16,7 @@ from tests.studies.octant import SCENE as OCTANT
 from tests.studies.report.view.made import reference_record
 
 EDGES = ((0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3))
-"""Vertices beside each mid-side node of vtkQuadraticTetra."""
+"""Vertices at the ends of the side of each mid-side node of vtkQuadraticTetra."""
 
 
 @pytest.fixture(scope="module")

@@ -18,8 +18,8 @@ from tests.studies.report.view.made import stored_case, stored_reference
 
 @pytest.fixture
 def root(tmp_path, monkeypatch):
-    """A reference, two cases of it, one of which a second study has too, and one that did not start. What is written
-    without a name lands beside it."""
+    """A reference, two cases of it, one of which a second study has too, and one that did not start. A file
+    without a name lands next to it."""
     monkeypatch.chdir(tmp_path)
     root = tmp_path / "results"
     stored_reference(root)
@@ -76,7 +76,7 @@ def test_alone_it_lists_what_can_be_viewed(root, organbench):
     assert [case.strip() for case in cases] == [f"{stem(root, 'free')} (inverted)", stem(root, "implicit_volume")]
 
 
-def test_what_is_missing_is_said_and_the_rest_is_shown(root, tmp_path, organbench):
+def test_a_warning_names_what_is_missing_and_the_rest_is_shown(root, tmp_path, organbench):
     for file in (root / "reference").iterdir():
         file.unlink()
     stored_reference(root, status=Status.NOT_CONVERGED)

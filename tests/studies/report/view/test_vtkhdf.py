@@ -34,7 +34,7 @@ def path(grid, tmp_path_factory):
 def test_types_and_shapes_are_those_of_the_specification(path, grid):
     steps, points, _ = grid.points.shape
     cells, ids = len(grid.types), len(grid.connectivity)
-    wanted = {
+    layout = {
         "NumberOfPoints": ("int64", (1,)),
         "NumberOfCells": ("int64", (1,)),
         "NumberOfConnectivityIds": ("int64", (1,)),
@@ -58,16 +58,16 @@ def test_types_and_shapes_are_those_of_the_specification(path, grid):
         "Steps/CellOffsets": ("int64", (steps, 1)),
         "Steps/ConnectivityIdOffsets": ("int64", (steps, 1)),
     }
-    data = [name for name in wanted if "Data/" in name]
-    wanted |= {f"Steps/{name.replace('/', 'Offsets/')}": ("int64", (steps,)) for name in data}
-    wanted |= {
+    data = [name for name in layout if "Data/" in name]
+    layout |= {f"Steps/{name.replace('/', 'Offsets/')}": ("int64", (steps,)) for name in data}
+    layout |= {
         f"Steps/{name.replace('/', 'Sizes/')}": ("int64", (steps, 2)) for name in data if name.startswith("Field")
     }
     with h5py.File(path) as file:
         items = {}
         file["VTKHDF"].visititems(items.__setitem__)
-        found = {name: (str(x.dtype), x.shape) for name, x in items.items() if isinstance(x, h5py.Dataset)}
-    assert found == wanted
+        datasets = {name: (str(x.dtype), x.shape) for name, x in items.items() if isinstance(x, h5py.Dataset)}
+    assert datasets == layout
 
 
 def test_attributes_are_those_of_the_specification(path):
@@ -124,11 +124,11 @@ def test_vtk_reads_every_step_to_the_last_bit(path, grid):
         fields = (grid.point_data, read.GetPointData()), (grid.cell_data, read.GetCellData())
         for data, shown in (*fields, (grid.field_data, read.GetFieldData())):
             for name, item in data.items():
-                array, wanted = shown.GetAbstractArray(name), item.values[step] if item.moves else item.values
-                if wanted.dtype.kind == "U":
-                    assert [array.GetValue(k) for k in range(array.GetNumberOfValues())] == wanted.tolist()
+                array, values = shown.GetAbstractArray(name), item.values[step] if item.moves else item.values
+                if values.dtype.kind == "U":
+                    assert [array.GetValue(k) for k in range(array.GetNumberOfValues())] == values.tolist()
                 else:
-                    exact(support.vtk_to_numpy(array).reshape(wanted.shape), wanted)
+                    exact(support.vtk_to_numpy(array).reshape(values.shape), values)
 
 
 def exact(read, written):
