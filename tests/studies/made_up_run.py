@@ -32,7 +32,7 @@ SHIFT = np.array([0.03, 0.0, 0.0])
 
 
 UNCERTAINTIES = ("force", "force_end", "surface", "interior", "silhouette", "volume", "pressure", "lumen", "frequency")
-"""Quantities whose floors tests know: 1 %, 2 % and so on; those that METRICS has besides follow."""
+"""Quantities with floors of 1 %, 2 % and so on; the others of METRICS follow."""
 
 
 ATTRIBUTES = {

@@ -1,4 +1,4 @@
-"""An octant of the squeezed ball on three very coarse meshes: a reference that takes seconds."""
+"""An octant of the squeezed ball on three very coarse meshes; its reference takes seconds."""
 
 from dataclasses import replace
 

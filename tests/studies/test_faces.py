@@ -1,4 +1,4 @@
-"""What a package shows at its face is there, is typed, and loads nothing else."""
+"""Public names of a package exist, are typed, and load nothing else."""
 
 import ast
 import os

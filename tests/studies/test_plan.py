@@ -154,7 +154,7 @@ def test_a_log_has_one_line_on_compiling_and_then_rests():
     assert QUIET_SECONDS > 1
 
 
-def test_numba_is_heard_once_for_each_function_that_is_called():
+def test_numba_reports_each_compiled_function_once():
     @numba.njit
     def inner(x):
         return x + 1
@@ -163,14 +163,14 @@ def test_numba_is_heard_once_for_each_function_that_is_called():
     def outer(x):
         return inner(x) * 2
 
-    heard = []
-    with watching(heard.append) as watch:
+    functions = []
+    with watching(functions.append) as watch:
         assert outer(1) == 4
         assert outer(2) == 6
-    assert heard == ["outer"] and len(watch.compiled) == 2
+    assert functions == ["outer"] and len(watch.compiled) == 2
     assert watch.seconds > 0
     outer(1.0)
-    assert heard == ["outer"]
+    assert functions == ["outer"]
 
 
 def compile_something(task):
@@ -178,7 +178,7 @@ def compile_something(task):
     assert fresh(1) == 2
 
 
-def test_workers_tell_what_they_compile():
-    heard = []
-    list(run_each(["compiles"], 1, compile_something, partial(begin, ()), tell=heard.append))
-    assert heard == ["<lambda>"]
+def test_workers_report_what_they_compile():
+    functions = []
+    list(run_each(["compiles"], 1, compile_something, partial(begin, ()), tell=functions.append))
+    assert functions == ["<lambda>"]

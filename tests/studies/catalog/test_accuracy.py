@@ -1,4 +1,4 @@
-"""The campaign holds what it promises: every scene that can be judged, a ladder of bodies, no case that is refused."""
+"""The campaign has every scene with a reference, a ladder of bodies, and no case that is refused."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""Every study is held to this: a question, cases that can be made, names that exist, and a smoke version."""
+"""Every study has a question, cases that can be prepared, names that exist, and a smoke version."""
 
 from dataclasses import replace
 
@@ -113,7 +113,7 @@ QUICK = [case for study in STUDIES if study.name != "organs" for case in study.s
 @pytest.mark.slow
 @pytest.mark.parametrize("case", representatives(QUICK), ids=lambda case: case.name)
 def test_every_kind_of_case_can_be_prepared(case):
-    """Once, though several studies have it."""
+    """Only once, although several studies share the case."""
     check_prepared(case)
 
 

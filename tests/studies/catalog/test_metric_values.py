@@ -47,7 +47,7 @@ def test_a_tenth_too_much_is_ten_per_cent(factor):
 
 
 def test_a_rigid_shift_is_its_length():
-    """Everything moves by 30 mm and the model by 3 mm more: a tenth everywhere, 3 mm over the diagonal of the body."""
+    """The reference moves by 30 mm, the body by 3 mm more: errors are a tenth, or 3 mm over the body's diagonal."""
     even = reference(lambda x: np.tile(SHIFT, (len(x), 1)))
     shifted = {"final": POINTS + 1.1 * SHIFT, "reference": even}
     for name in ("surface_error", "interior_error", "mean_error"):

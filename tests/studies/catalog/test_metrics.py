@@ -1,4 +1,4 @@
-"""The contract that every metric keeps: what it says of itself, where it is silent, how far it can be trusted."""
+"""The contract of every metric: what it declares, where it has no value, and when a value is doubtful."""
 
 from dataclasses import replace
 
@@ -41,7 +41,7 @@ def test_names_are_unique_and_studies_use_no_others():
 
 @pytest.mark.parametrize("entry", METRICS, ids=lambda entry: entry.name)
 def test_every_metric_is_a_number_somewhere(entry):
-    """A metric that no scene allows would be an empty column for ever."""
+    """A metric that no scene allows would be an empty column in every table."""
     # Of many checkpoints: tests/studies/runs/test_motion.py; of obstacles: tests/studies/metrics/test_contact.py.
     if entry.quantity == "frequency" or entry.name.startswith("contact"):
         return
@@ -59,7 +59,7 @@ def test_every_metric_is_a_number_somewhere(entry):
 
 @pytest.mark.parametrize("entry", METRICS, ids=lambda entry: entry.name)
 def test_what_a_scene_does_not_allow_is_nan(entry):
-    """A metric of the run alone stays what it is."""
+    """A metric of the run alone keeps its value in a scene that compares no quantity."""
     mute = replace(SCENE, quantities=())
     judged = entry.quantity not in (None, *ALWAYS, *GAUGE_FREE) or entry.name == "sway"  # of the force
     expected = np.nan if judged else entry(run())

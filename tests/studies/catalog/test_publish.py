@@ -1,4 +1,4 @@
-"""The repository shows copies of current results, and nothing that a visitor computes shows up in git."""
+"""The repository holds copies of current results; git ignores what a user computes."""
 
 import shutil
 import subprocess
@@ -267,7 +267,7 @@ def test_what_is_published_is_current_until_the_code_that_makes_it_changes(curre
     # Other code of one maker.
     monkeypatch.setitem(EXTRAS, "bench.csv", replace(EXTRAS["bench.csv"], makers=("studies.bench.meshes",)))
     assert status_of(home, HEADLINE) == dict.fromkeys(names, CURRENT) | {"bench.csv": STALE}
-    # A page that somebody wrote into.
+    # A page that somebody edited.
     (home / PAGE).write_text((home / PAGE).read_text().replace(f"{BEGIN}\n", f"{BEGIN}\nby hand\n"))
     assert status_of(home, HEADLINE)[block] == STALE
     # What was published before codes were noted.

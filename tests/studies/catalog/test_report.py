@@ -1,4 +1,4 @@
-"""Charts, tables and the summary: what people look at says what is stored, and what is missing."""
+"""Charts, tables and the summary show what is stored, and name what is missing."""
 
 import json
 import math

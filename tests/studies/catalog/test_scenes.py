@@ -1,4 +1,4 @@
-"""Every scene is held to this: stored and read back equal, the same load for both solvers, and something happens."""
+"""Every scene is read back as it was stored, loads both solvers alike, and moves its body."""
 
 import json
 from dataclasses import replace
@@ -69,7 +69,7 @@ def test_checkpoints_ascend_within_the_duration(scene):
 
 
 def test_what_is_deepest_at_the_last_checkpoint_has_stopped_before(scene):
-    """Otherwise the last checkpoint would show ringing instead of equilibrium."""
+    """Otherwise the body would still ring at the last checkpoint."""
     paths = [o.path for o in scene.obstacles] + [h.path for h in scene.held]
     ramps = [scene.lumen.filling] if scene.lumen else []
     if scene.reference is not None and scene.reference.dt is not None:

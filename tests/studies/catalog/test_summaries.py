@@ -1,4 +1,4 @@
-"""Tables for README and docs: which body is named, with which numbers, and what marks one that does not suffice."""
+"""Tables for README and docs: the recommended body, its numbers, and the mark of one that misses the target."""
 
 from dataclasses import replace
 from types import SimpleNamespace

@@ -1,4 +1,4 @@
-"""A sweep does what is missing or stale, once; what is finished stays, whatever happens to the rest."""
+"""A sweep computes what is missing or stale, once; finished results stay, whatever happens to the others."""
 
 from dataclasses import replace
 from functools import partial
@@ -87,7 +87,7 @@ def test_a_damaged_file_is_stale_and_runs_again(results, number):
     assert len(runs) == 2
     assert len(remarks) == 1
     assert path.name in remarks[0] and "is cut off or damaged" in remarks[0]
-    # Of the two cases that are left, what their bodies are; the damaged one says nothing.
+    # The two other cases have a warning on the shape of their bodies; the damaged one has none.
     assert ["volume -9.7 %" in sentence for sentence in warnings_of(Ledger(results), study)] == [True, True]
     assert not failed(Ledger(results), CaseJob(results, "tiny", diverging_case()))
     assert run_studies(results, [study], 1, Silent()) == 1

@@ -5,7 +5,7 @@ import pytest
 
 @pytest.fixture
 def heard():
-    """A shell's background job, and what it starts, ignores Ctrl-C's signal; here it is meant."""
+    """Restores Ctrl-C's signal, which a shell's background job and its children ignore."""
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     yield
     signal.signal(signal.SIGINT, before)

@@ -83,7 +83,7 @@ def test_output_that_is_not_taken(organbench, monkeypatch):
 
 
 def test_a_folder_that_may_not_be_entered(refused, tiny_file, results, monkeypatch):
-    """The superuser may enter every folder, so the system's answer is made up."""
+    """The superuser may enter every folder, so the test replaces `os.stat`."""
     real_stat = os.stat
 
     def stat(path, *words, **more):

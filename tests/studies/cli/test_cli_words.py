@@ -1,4 +1,4 @@
-"""The list of commands and the list of names say what the code says, without loading it."""
+"""The list of commands and the list of names agree with the code, without loading it."""
 
 import pkgutil
 from collections import Counter

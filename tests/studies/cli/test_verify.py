@@ -13,8 +13,8 @@ from studies.cli import app as cli
 from studies.tools.verify import verification
 
 
-def oracle(name, got, fast=True, **options):
-    check = Check("force", "N", 2.0, got, 0.01, "block, 48 P2/P1", 402, **options)
+def oracle(name, value, fast=True, **options):
+    check = Check("force", "N", 2.0, value, 0.01, "block, 48 P2/P1", 402, **options)
     curve = Curve("error of u", name, (0.5, 0.25), (0.1, 0.0125))
     return Oracle(name, f"Title of {name}", "closed form", lambda: Outcome((check,), (curve,)), fast)
 
@@ -45,9 +45,9 @@ def test_numbers_that_agree_are_printed_and_kept(run, tmp_path):
     assert list(pd.read_csv(tmp_path / "verify" / "kappa.csv")["kappa/mu"]) == list(kappa.RATIOS)
 
 
-@pytest.mark.parametrize("got", [2.1, math.nan])
-def test_a_number_that_is_off_fails_the_command(run, tmp_path, got):
-    result = run([oracle("right", 2.0), oracle("wrong", got)])
+@pytest.mark.parametrize("value", [2.1, math.nan])
+def test_a_number_that_is_off_fails_the_command(run, tmp_path, value):
+    result = run([oracle("right", 2.0), oracle("wrong", value)])
     assert result.exit_code == 1
     assert "off: wrong: force" in result.stdout
     assert list(pd.read_csv(tmp_path / "verify" / "verify.csv")["met"]) == ["yes", "NO"]

@@ -1,4 +1,4 @@
-"""Bounds are read as people type them; what is no bound is one sentence."""
+"""Bounds are read in the usual spellings; anything else is refused in one sentence."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""What is handed in: our own run, and the file of its scene."""
+"""Our own run as an entry, and the file of its scene."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""An exported scene, read with meshio, json and csv alone: all that another program needs is there and right."""
+"""An exported scene, read with meshio, json and csv alone: it has all that another program needs."""
 
 import csv
 import json

@@ -1,4 +1,4 @@
-"""What is handed in and does not fit is refused with the reason, and nothing is written."""
+"""An entry that does not fit is refused with the reason, and nothing is written."""
 
 import numpy as np
 import pytest

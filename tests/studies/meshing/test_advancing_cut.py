@@ -1,4 +1,4 @@
-"""A cut that advances over a mesh: at each stage the body is one that can be, and in the end all of the cut is open."""
+"""A cut that advances over a mesh: the body is valid at each stage, and all of the cut is open at the end."""
 
 import itertools
 
@@ -48,7 +48,7 @@ def fans(triangles: np.ndarray) -> dict[int, int]:
 
 
 def wrong(cells: np.ndarray, faces: np.ndarray, n: int) -> str | None:
-    """What is wrong with the surface of a body that is opened along some faces: looked for on the surface itself."""
+    """The fault of the surface of a body that is opened along some faces, found on the surface itself."""
     try:
         triangles = boundary(opened(cells, faces, n).cells.astype(np.int64)) if len(faces) else boundary(cells)
     except MassSpringError as error:
@@ -116,7 +116,7 @@ def test_random_sections_open_without_meeting_themselves(seed, inner):
 
 
 def test_without_waiting_some_surfaces_would_meet_themselves(monkeypatch):
-    """So the tests above can fail."""
+    """The tests above can fail."""
     monkeypatch.setattr(advancing_cut, "meetings", lambda faces, parting, passed: np.zeros(len(passed), dtype=bool))
     faults = set()
     for seed in MEETING:

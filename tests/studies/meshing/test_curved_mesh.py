@@ -1,4 +1,4 @@
-"""Quadratic elements on the true shape: where one would fold, its sides are held back, and nobody is refused."""
+"""Quadratic elements on the true shape: the sides of one that would fold are held back; no mesh is refused."""
 
 import warnings
 from dataclasses import replace

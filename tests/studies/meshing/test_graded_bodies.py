@@ -1,4 +1,4 @@
-"""Bodies on graded and quadratic meshes: held where the scene says, as heavy and as large as their organ."""
+"""Bodies on graded and quadratic meshes have the mass, volume and held region of their scene."""
 
 import numpy as np
 import pytest

@@ -122,7 +122,7 @@ def test_a_finer_mesh_has_about_twice_as_many_elements(family):
 
 
 def test_the_boundary_is_on_the_true_surface_and_outlines_on_the_true_outline(family):
-    """None was put back, so all of them are."""
+    """No node was put back."""
     for mesh, _ in family[1:]:
         assert mesh.off == 0
         flat = MeshTet2.from_mesh(mesh.body.mesh)
@@ -199,7 +199,7 @@ def test_the_same_marks_give_the_same_bits(base, family):
 
 
 def test_the_last_bits_of_an_indicator_change_no_mark(base):
-    """Other processors round otherwise: what is the same but for that is taken by its number."""
+    """Processors round differently: elements with equal indicators are marked in the order of their numbers."""
     ranks = np.argsort(np.argsort(beside_top_outline(base)))
     indicator = 1.0 + ranks // 40
     noisy = indicator * (1 + 1e-15 * np.random.default_rng(1).integers(-2, 3, len(indicator)))

@@ -89,7 +89,7 @@ class SlitBody:
         """Displacements (n, 3) [m] under forces (n, 3) [N] where further `rows` (n, 3) have `values`, and the
         multipliers of these [Pa]."""
         free = np.flatnonzero(~self.held.ravel())
-        stiffness, scale = stiffness_at_rest(self.body)[free][:, free], MU / A  # so that all rows are alike
+        stiffness, scale = stiffness_at_rest(self.body)[free][:, free], MU / A  # scales all rows alike
         kept = scale * vstack(
             [self.body.kept.jacobian(self.x), *(csr_array(row.reshape(1, -1)) for row in rows)], "csr"
         )

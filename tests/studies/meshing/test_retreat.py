@@ -1,4 +1,4 @@
-"""Nodes go as far as their elements allow, and no less."""
+"""Nodes move as far as their elements allow."""
 
 import numpy as np
 import pytest

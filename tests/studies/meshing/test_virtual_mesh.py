@@ -1,4 +1,4 @@
-"""The mesh of a ball that knows no cut, cut by virtual nodes: what moves, and what is shown of it."""
+"""A ball's mesh without faces on the cut, cut by virtual nodes: what moves, and what is shown of it."""
 
 import numpy as np
 import pytest

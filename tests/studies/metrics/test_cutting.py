@@ -32,12 +32,12 @@ def test_pieces_on_their_way_are_exact():
         assert of(name, **cut_run(TARGET)) == pytest.approx(0.0, abs=1e-12)
 
 
-@pytest.mark.parametrize(("frame", "seen"), [(0, 0.0), (1, 0.0), (2, 0.5), (3, 0.5)])
-def test_a_piece_is_judged_once_its_clock_has_run_out_even_if_the_sum_is_right(frame, seen):
+@pytest.mark.parametrize(("frame", "error"), [(0, 0.0), (1, 0.0), (2, 0.5), (3, 0.5)])
+def test_a_piece_is_judged_once_its_clock_has_run_out_even_if_the_sum_is_right(frame, error):
     """The small one half a per cent too large, what it has too much missing in the large one."""
     volume = TARGET.copy()
     volume[frame] += 2e-4 * 0.005 * np.array([1, -1])
-    assert of("piece_worst", **cut_run(volume)) == pytest.approx(seen, abs=1e-9)
+    assert of("piece_worst", **cut_run(volume)) == pytest.approx(error, abs=1e-9)
     assert of("piece_sum_worst", **cut_run(volume)) == pytest.approx(0.0, abs=1e-9)
 
 

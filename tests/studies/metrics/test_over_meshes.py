@@ -49,18 +49,18 @@ def test_a_quadratic_recipe_on_one_mesh_is_no_answer_where_others_ran_on_five():
     linear = row(BodyRecipe(nodes=550), 30.0, 10.0)
     rows = over_meshes([*five(), single, linear])
     assert [one.case.body for one in rows] == [BODY, linear.case.body]
-    assert over_meshes([single, linear]) == [single, linear]  # alone it counts, and says so
+    assert over_meshes([single, linear]) == [single, linear]  # alone it counts, with a remark
 
 
 def test_other_methods_on_quadratic_elements_stay():
-    """They are there for comparison, and run on one mesh."""
+    """They run on one mesh, for comparison."""
     other = row(replace(BODY, nodes=294), 2.0, 0.5)
     other = replace(other, case=replace(other.case, method=ImplicitElements(), dt=0.01))
     assert [one.case.method.name for one in over_meshes([*five(), other])] == ["implicit_volume", "implicit_elements"]
 
 
 def test_of_five_meshes_none_may_be_missing():
-    """One ended badly: what is left is no family."""
+    """One of the five failed: four are no family."""
     broken, whole = five(replace(BODY, nodes=594))[:4], five()
     assert [one.case.body.nodes for one in over_meshes([*broken, *whole])] == [794]
 

@@ -1,4 +1,4 @@
-"""mean_error over the true surface: what lies between the body's nodes, and what the body lacks, is in it."""
+"""mean_error over the true surface includes errors between the body's nodes and places that the body lacks."""
 
 from dataclasses import replace
 
@@ -47,7 +47,7 @@ def test_what_the_body_lacks_beyond_a_hundredth_of_the_size_is_an_error(gap):
 
 
 def test_nothing_is_left_out():
-    """A body that is nowhere near: the whole distance counts."""
+    """The whole distance of a body far away counts."""
     far = POINTS + np.array([1.0, 0.0, 0.0])
     error = of("mean_error", values=body_of(far, TRIANGLES, cube()[2], even), reference=reference(even))
     assert error > 100 * (1.0 - EDGE - SHAPE / 100 * EDGE * 3**0.5) / 0.03

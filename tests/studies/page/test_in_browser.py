@@ -1,4 +1,4 @@
-"""The replay of report.html in a real browser: it loads in silence, moves, obeys keys, and shows what was packed."""
+"""The replay of report.html in a real browser: it loads without errors, moves, obeys keys, and shows packed frames."""
 
 import base64
 import json
@@ -39,7 +39,7 @@ def to_time(page, key: str) -> None:
 
 def test_the_first_picture_comes_soon_and_the_body_moves_beside_its_reference(visit):
     page = visit()
-    assert min(took(page), *(took(visit()) for _ in range(2))) <= FIRST_PICTURE  # others may be at work here too
+    assert min(took(page), *(took(visit()) for _ in range(2))) <= FIRST_PICTURE  # other processes may use the machine
     last = screen(page)  # at full load, where the difference is
     assert shown(page) == 4.0 and page.inner_text("#clock") == "4.00 s of 4 s"
     to_time(page, "Home")
@@ -60,8 +60,8 @@ def test_positions_are_read_as_they_were_packed(visit):
     data = json.loads(page.locator("#data").text_content())
     case = data["pieces"][f"case-{data['first']}"]
     given = case["replay"]["positions"]
-    seen = page.evaluate("async (given) => (await frames(given)).map((frame) => [...frame])", given)
-    assert np.allclose(np.array(seen).reshape(-1, 6, 3), unpack_frames(given), atol=1e-8)
+    unpacked = page.evaluate("async (given) => (await frames(given)).map((frame) => [...frame])", given)
+    assert np.allclose(np.array(unpacked).reshape(-1, 6, 3), unpack_frames(given), atol=1e-8)
     history = case["histories"]["volume"]["values"]
     values = page.evaluate("(given) => series(given)", history)
     assert np.allclose(np.array(values, dtype=float), unpack_series(history), rtol=1e-12, atol=1e-300)

@@ -1,4 +1,4 @@
-"""What is packed into the page comes out again, as near as is promised."""
+"""Packed positions and series are unpacked within the promised precision."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""The page as a file: complete, within its size, nothing from elsewhere, and whole whatever names and texts hold."""
+"""The page as a file: complete, within its size, without outside resources, and valid with any names and texts."""
 
 import base64
 import hashlib
@@ -265,7 +265,7 @@ def test_a_damaged_part_of_a_study_without_results_is_left_out_and_named(kept, t
 @pytest.mark.parametrize("kind", ["cases", "references"])
 @pytest.mark.parametrize("name", ["/../../../stray", "xyz", "'"])
 def test_no_part_writes_a_file_elsewhere(kept, tmp_path, monkeypatch, kind, name):
-    """A stranger may write a part with its digest: what names files in it is refused."""
+    """A stranger may write a part with its digest: a part that names files is refused."""
     monkeypatch.setattr(module, "LIMIT", 0)
     root = shutil.copytree(kept[0], tmp_path / "kept")
     path = part_path(root, kept[1][0])

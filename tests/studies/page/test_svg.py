@@ -1,4 +1,4 @@
-"""What a stored chart may bring into the page: what draws, and nothing that acts, loads or covers."""
+"""A stored chart may only draw in the page: scripts, links and overlays are removed."""
 
 import re
 from xml.etree import ElementTree

@@ -1,4 +1,4 @@
-"""What stands around the replay of report.html in a real browser: tabs and tables obey, all of it can be read."""
+"""Tabs, tables and texts of report.html in a real browser: they work, and all of them can be read."""
 
 from pathlib import Path
 
@@ -28,7 +28,7 @@ def test_the_table_sorts_by_size_of_errors_with_what_is_unknown_last(visit):
     number, status = (
         next(k for k, head in enumerate(heads, 1) if head.startswith(word)) for word in ("force", "status")
     )
-    page.locator(f"#cases thead th:nth-child({status}) button").click()  # those that ended badly come first
+    page.locator(f"#cases thead th:nth-child({status}) button").click()  # failed runs come first
     head = page.locator(f"#cases thead th:nth-child({number})")
     for word, order in (("ascending", 1), ("descending", -1)):
         head.locator("button").focus()

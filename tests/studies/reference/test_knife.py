@@ -1,4 +1,4 @@
-"""A knife in the deformed body: exact where the deformation is uniform, refused where a plane would not do."""
+"""A knife in the deformed body: exact in a uniform deformation, refused where a plane is too far from it."""
 
 from dataclasses import replace
 from types import SimpleNamespace

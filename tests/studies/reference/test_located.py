@@ -1,4 +1,4 @@
-"""Points are found once in a mesh, whichever solution and whichever checkpoint."""
+"""Points are located once in a mesh, for all solutions and checkpoints on it."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -20,7 +20,7 @@ from tests.studies.tiny import cube
 
 @pytest.fixture
 def located(monkeypatch):
-    """How many points each search was for."""
+    """The number of points of each search."""
     searched, locate = [], Evaluator.locate
     monkeypatch.setattr(Evaluator, "locate", lambda self, points: searched.append(len(points)) or locate(self, points))
     return searched

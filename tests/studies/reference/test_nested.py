@@ -48,7 +48,7 @@ def ball(family, tmp_path_factory):
 
 
 def test_the_bar_holds_the_true_force_and_is_not_idle(ball):
-    """Coarse meshes are too stiff by .9 %, and say 1.8 %."""
+    """Coarse meshes are too stiff by .9 %, and their bar is 1.8 %."""
     error = ball.force[-1] / TRUTH - 1
     assert 0.003 < error < ball.total_uncertainty["force_end"] < 5 * error
 

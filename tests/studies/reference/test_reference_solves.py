@@ -1,4 +1,4 @@
-"""The reference of a scene as a job: when it is current, how it stands, what a path that breaks off leaves."""
+"""The reference of a scene as a job: when it is current, its status, and the record of a path that breaks off."""
 
 import json
 import shutil
@@ -141,7 +141,7 @@ def breaks(monkeypatch, number, reached):
 
 
 def test_a_path_that_breaks_off_is_stored_and_not_believed(tmp_path, monkeypatch):
-    """On the second of three meshes: the first one is there to be looked at."""
+    """On the second of three meshes: the solution on the first one is stored."""
     breaks(monkeypatch, number=1, reached=1)
     record = read_record(solve(tmp_path, ReferenceSolve(SCENE)))
     assert record.status == Status.NOT_CONVERGED

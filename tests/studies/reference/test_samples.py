@@ -1,4 +1,4 @@
-"""What the solutions of a reference's family say: kept in the record, and compared at the vertices of the coarsest."""
+"""Samples of a reference's solutions are stored in the record and compared at the vertices of the coarsest mesh."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -55,7 +55,7 @@ def test_samples_come_back_from_a_record_bit_for_bit():
 
 
 def empty_fields():
-    """All fields of a reference, of length zero where there is nothing to say."""
+    """All fields of a reference, of length zero where it has no values."""
     lengths = {"K": END + 1, "c": 1, "3": 3, "4": 4}
     return {
         name: np.zeros(

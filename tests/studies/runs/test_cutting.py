@@ -209,7 +209,7 @@ def test_a_surface_body_is_recorded_and_measured_like_the_others(tmp_path):
     assert METRIC["cut_momentum"](run) < 1e-10
     assert 0.1 < METRIC["cut_energy"](run) < 10.0  # that of the springs across
     assert 0.5 < METRIC["cut_limit"](run) < 1.0 and METRIC["cut_ms"](run) > 0.0
-    # No spring that is new drives it: energy goes down from the cut to the next pull.
+    # No new spring adds energy: it decreases from the cut to the next pull.
     total = run.field("elastic") + run.field("kinetic")
     assert (np.diff(total[first - 1 : first + 3]) < 0).all()
     (axes,) = pieces.figure([run]).axes

@@ -1,4 +1,4 @@
-"""What tells that an answer should not be believed, on histories and bodies with exact numbers."""
+"""Signs of a wrong answer, on histories and bodies with exact numbers."""
 
 from dataclasses import replace
 from types import SimpleNamespace

@@ -1,4 +1,4 @@
-"""What no machine could compute is refused before it begins, with the numbers, and stored as a failure."""
+"""A case that is too large for any machine is refused with its numbers and stored as a failure."""
 
 from dataclasses import replace
 

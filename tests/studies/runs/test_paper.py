@@ -1,4 +1,4 @@
-"""The paper's scenes on small bodies: the slide is stored and read back, plays, and what it shows is true."""
+"""The paper's scenes on small bodies: the slide is stored, read back and played, with true positions."""
 
 import json
 

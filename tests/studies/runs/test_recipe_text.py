@@ -1,4 +1,4 @@
-"""A case is made again from its scene and the text that a table has of it."""
+"""A scene and a recipe's text of a table give the case again."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""Whatever happens in a run is a record: how it ended, why, NaN after that; and a replay comes out the same."""
+"""Every run leaves a record: how it ended, why, NaN after its end; a replay gives the same numbers."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""Scenes whose cut closes: pressed shut it is as if it were not there, and next to its reference."""
+"""Scenes whose cut closes, against the body without the cut and against the reference."""
 
 from dataclasses import replace
 

@@ -64,8 +64,8 @@ def test_a_section_leaves_pieces_with_their_volumes(body, tmp_path):
     behind, front = run.cut_pairs.T
     last = run.fields.snapshots[-1]
     np.testing.assert_allclose(last[front, 2] - last[behind, 2], 0.01, atol=2e-3)
-    seen, nodes = run.field("surface"), run.field("surface_node")
-    np.testing.assert_allclose(seen[-1], last[nodes], atol=1e-7)
+    surface, nodes = run.field("surface"), run.field("surface_node")
+    np.testing.assert_allclose(surface[-1], last[nodes], atol=1e-7)
     assert run.fields.mass.sum() == pytest.approx(1060.0 * whole, rel=1e-9)
 
 

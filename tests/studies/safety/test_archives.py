@@ -1,4 +1,4 @@
-"""An archive of a stranger: only its own files are opened, and each question comes to an end."""
+"""An archive of a stranger: only its own files are opened, and every check ends."""
 
 import hashlib
 import os

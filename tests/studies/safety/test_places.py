@@ -1,4 +1,4 @@
-"""What lies where a file belongs and is none: a link to itself, a folder, a pipe. The rest goes on."""
+"""A link to itself, a folder or a pipe in the place of a file: the other files are read."""
 
 import os
 

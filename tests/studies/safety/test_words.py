@@ -1,4 +1,4 @@
-"""Whoever is about to run a stranger's file can read that it is a program."""
+"""Commands and documents say that a stranger's FILE.py is a program."""
 
 from pathlib import Path
 

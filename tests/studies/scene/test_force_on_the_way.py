@@ -1,4 +1,4 @@
-"""What of the error of the force on the way is drag: the table of docs/accuracy.md, and what it says of the cure."""
+"""The share of drag in the error of the force along the path: the table of docs/accuracy.md, and its remedy."""
 
 import re
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""Hold and probe on a body: by rule, at a side, at a point; and the tissue that a name tells."""
+"""Hold and probe on a body: by rule, at a side, at a point; and the tissue that belongs to a name."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""The ledger of a results folder says what its files say, and opens those alone that have changed."""
+"""The ledger of a results folder says what its files say, and opens only files that have changed."""
 
 import os
 import sqlite3

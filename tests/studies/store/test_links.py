@@ -143,7 +143,7 @@ def test_an_index_is_no_record(tmp_path):
 
 
 def test_an_index_that_says_the_same_is_left_as_it_is(tmp_path, monkeypatch):
-    """So that results which may only be looked at can be looked at by `run` too."""
+    """`run` can read results in a folder that it cannot write to."""
     store(tmp_path, "ball/free", '{"a": 1}')
     link_study(Ledger(tmp_path), "volume_loss")
     before = index_path(tmp_path, "volume_loss").stat().st_mtime_ns

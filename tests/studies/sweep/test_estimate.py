@@ -1,4 +1,4 @@
-"""First runs are estimated: unknowns and seconds predicted before there is a mesh, held to what was published."""
+"""First runs are estimated: unknowns and seconds predicted without a mesh, against published numbers."""
 
 import csv
 import json

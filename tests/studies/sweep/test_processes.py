@@ -77,7 +77,7 @@ class Unsendable(Exception):
 
 
 def swept(tasks, jobs=2):
-    """What became of the tasks: number done, and the causes of those that died."""
+    """Number of tasks done, and the causes of those that died."""
     ended = list(run_each(tasks, jobs, methodcaller("perform")))
     return len(ended), [(task, cause) for task, _, cause in ended if cause is not None]
 

@@ -1,4 +1,4 @@
-"""A folder of surfaces as a population: placed by rule, mended, or refused with a reason; one bad file costs itself."""
+"""A folder of surfaces as a population: placed by rule, repaired, or refused with a reason."""
 
 import warnings
 

@@ -1,4 +1,4 @@
-"""What `organbench mesh-check` advises has been tried: its command makes a clean body, or it says what was tried."""
+"""`organbench mesh-check` tries its advice: the command makes a clean body, or the output lists what was tried."""
 
 import json
 import shlex
@@ -67,7 +67,7 @@ def test_the_command_that_is_printed_works(organbench, tmp_path, monkeypatch, fa
 
 
 def test_advice_that_does_not_work_is_not_printed(organbench, tmp_path):
-    """Of an open triangle, and of a bowl with a double wall: nothing that is tried makes a body of it."""
+    """No option makes a body of an open triangle, or of a bowl with a double wall."""
     path = stored(tmp_path / "one.ply", 100 * np.eye(3), [[0, 1, 2]])
     code, out, _ = organbench("mesh-check", path, "--unit", "mm")
     assert code == 1 and TRIED not in out and "-> try" not in out and "FILE" not in out

@@ -1,4 +1,4 @@
-"""`organbench mesh` and `organbench mesh-check`: files in, files out, one sentence where it cannot be."""
+"""`organbench mesh` and `organbench mesh-check`: files in, files out, one sentence for bad input."""
 
 import json
 import os
@@ -48,7 +48,7 @@ def test_an_organ_that_few_nodes_cannot_hold_names_the_number_that_does(organben
 
 
 def test_the_number_that_is_named_has_been_tried():
-    """One number gives no mesh, one a mesh that does not keep the shape, the third one does."""
+    """The first number gives no mesh, the second a mesh that does not keep the shape; the third one keeps it."""
     few, many = (Made(organ("ball", nodes, fill=False, exact=True), None) for nodes in (60, 300))
     truth, counts = Organ("ball", {}), []
 

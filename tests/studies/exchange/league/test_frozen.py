@@ -1,4 +1,4 @@
-"""The frozen set: what it tells is true here, and what it holds back cannot be guessed or entered."""
+"""The frozen set agrees with the code, and scenes that it holds back cannot be guessed or entered."""
 
 import json
 import re
@@ -52,7 +52,7 @@ def test_open_scenes_are_judged_by_the_references_that_the_set_names(scene: Scen
 
 
 def test_no_member_with_a_small_seed_is_held_back():
-    """Who tries the seeds that people take finds none of them."""
+    """The usual seeds give none of them."""
     hashes = {one.physics for one in HELD.values()}
     drawn = [member(organ, seed, 0) for organ in ("liver", "kidney") for seed in (*range(4), 2026, 2027)]
     assert not hashes & {physics(scene) for scene in drawn}

@@ -1,4 +1,4 @@
-"""Programs that hand in, refuse, crash, hang or are not there: each has its row, and the rest goes on."""
+"""Programs that finish, refuse, crash, hang or are missing: each has its row, and the others run."""
 
 import shutil
 from dataclasses import replace
@@ -144,7 +144,7 @@ LIMITS = {
 @pytest.mark.slow
 @pytest.mark.parametrize("peer", [peer for peer in (*PEERS, *OURS) if not peer.absent], ids=lambda peer: peer.name)
 def test_each_program_squeezes_the_ball(reference, tmp_path, mesh_cache, peer):
-    """Where its environment is made: what it hands in is a squeezed ball."""
+    """The entry of each installed program is a squeezed ball."""
     if peer.packages and not (ENVIRONMENTS / peer.name / "packages.txt").is_file():
         pytest.skip(f"{peer.name} is not installed here: `make study-league`")
     scene = replace(BALL_SQUEEZE, checkpoints=SCENE.checkpoints)

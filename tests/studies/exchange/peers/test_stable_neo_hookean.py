@@ -1,4 +1,4 @@
-"""Forces computed for programs that do not report them are those of an energy, with the constants of the tissue."""
+"""Forces of programs that do not report them are derivatives of an energy with the constants of the tissue."""
 
 import numpy as np
 import pytest

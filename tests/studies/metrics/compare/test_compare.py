@@ -79,7 +79,7 @@ def test_the_larger_floor_of_both_counts(tmp_path):
 
 @pytest.mark.parametrize("old", [{}, {"reference": "2027.1 0a0a0a0a"}])
 def test_errors_against_two_references_are_not_judged(tmp_path, organbench, old):
-    """A force that moved by ten times its uncertainty, against another truth; a number without one moves as ever."""
+    """The force moved by ten times its uncertainty, but its reference differs; a number without a reference moved."""
     before = folder(tmp_path / "old", rows(**old))
     new = {"reference": "2027.2 0b0b0b0b", "force_end [%]": -25.0, "min_j [1]": 0.5}
     comparison = compare(before, folder(tmp_path / "new", rows(**new)))

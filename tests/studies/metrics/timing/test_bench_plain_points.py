@@ -1,4 +1,4 @@
-"""The opponent of quadratic bodies makes the same motion, so that only speed is compared."""
+"""The plain code makes the motion of quadratic bodies, so that only speed is compared."""
 
 from dataclasses import replace
 

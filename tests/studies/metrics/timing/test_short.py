@@ -1,4 +1,4 @@
-"""A short timing keeps to the protocol: pinned, repeated, compiled before; and to its seconds."""
+"""A short timing is pinned, repeated, compiled before, and keeps to its seconds."""
 
 from dataclasses import replace
 

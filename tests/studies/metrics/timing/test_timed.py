@@ -1,4 +1,4 @@
-"""Frame times live in files of their own: re-timing never touches physics, and rivals take turns."""
+"""Frame times have files of their own: timing again never changes physics, and methods of one body take turns."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""An archive holds all that its charts need, says what each file is, and draws them again."""
+"""An archive holds all that its charts need, describes each file, and draws the charts again."""
 
 import hashlib
 import json

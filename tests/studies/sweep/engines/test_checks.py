@@ -1,4 +1,4 @@
-"""What must be so before a worker gets a job, and what a job declares."""
+"""Conditions that a worker meets before it gets a job, and the memory that a job declares."""
 
 import os
 import pickle

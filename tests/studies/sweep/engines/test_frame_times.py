@@ -1,4 +1,4 @@
-"""Frame times on a cluster, with workers that are made up: after all jobs, alone, once for each kind of machine."""
+"""Frame times on a cluster of made-up workers: after all jobs, alone, once for each kind of machine."""
 
 from contextlib import contextmanager
 from types import SimpleNamespace

@@ -114,7 +114,7 @@ def test_a_worker_that_joins_later_with_other_code_gets_nothing(file, other_code
     (here / "waits.py").write_text(WAITS)
     study = find_study(str(here / "waits.py"))
 
-    def heard(text, stacklevel):
+    def warned(text, stacklevel):
         warnings.append(text)
         (here / "go-on").touch()
 
@@ -124,7 +124,7 @@ def test_a_worker_that_joins_later_with_other_code_gets_nothing(file, other_code
             if len(self.done) == 1:
                 later.enter_context(running(worker(file, "late"), other_code, f"{other_code}:{ROOT}"))
 
-    monkeypatch.setattr("studies.sweep.engines.cluster.warnings", SimpleNamespace(warn=heard))
+    monkeypatch.setattr("studies.sweep.engines.cluster.warnings", SimpleNamespace(warn=warned))
     address = json.loads(file.read_text())["address"]
     with running(worker(file, "good"), here), engine_at(address, 60.0) as one, ExitStack() as later:
         run_studies(here / "results", [study], one, Follower())

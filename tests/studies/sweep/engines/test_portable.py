@@ -1,4 +1,4 @@
-"""Results that are equal on every x86-64 machine: what processes are given, and what records say."""
+"""Results that are equal on every x86-64 machine: the variables of processes, and the attribute of records."""
 
 import os
 import platform

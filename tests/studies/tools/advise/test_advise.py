@@ -1,4 +1,4 @@
-"""Advice is the cheapest recipe that was measured to be good enough, and nothing beyond what was measured."""
+"""Advice is the cheapest recipe with errors within the target; it uses measured numbers only."""
 
 from dataclasses import replace
 
@@ -112,7 +112,7 @@ def test_what_a_scene_does_not_compare_is_ignored_by_name(tmp_path, never_timed)
 
 
 def test_what_was_published_by_the_writer_of_tables_is_read_back(tmp_path, never_timed):
-    """No recipe, error or time is lost on the way through the table of a study."""
+    """The table of a study keeps every recipe, error and time."""
     options = {"nodes": 994, "fraction": 0.5, "frame_ms": 100.0, "recipe": {"graded": "adaptive", "mass": "stiffness"}}
     runs = [run(LIVER_PRESS, "quadratic", error=0.02, **options), run(LIVER_PRESS, error=0.5, frame_ms=50.0)]
     publish(tmp_path, [])

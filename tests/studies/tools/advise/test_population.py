@@ -1,4 +1,4 @@
-"""What `advise` says of organs that a recipe was not chosen on: read off the table of the population."""
+"""Errors of a recipe on other organs, which `advise` takes from the table of the population."""
 
 from dataclasses import replace
 

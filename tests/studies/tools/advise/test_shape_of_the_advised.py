@@ -1,4 +1,4 @@
-"""No body is recommended that lacks a piece of its organ, and the answer says which one would have been."""
+"""No body is recommended that lacks a piece of its organ, and the answer names the one that would be cheaper."""
 
 import pytest
 

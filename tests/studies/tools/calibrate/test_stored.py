@@ -1,4 +1,4 @@
-"""A calibration comes back from its file as it was, and nothing else is taken for one."""
+"""A calibration is read back from its file unchanged, and any other file is refused."""
 
 import json
 from dataclasses import replace

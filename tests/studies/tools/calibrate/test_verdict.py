@@ -1,4 +1,4 @@
-"""A fit that is worth nothing outside its own scenes is called so, on numbers that are chosen."""
+"""The verdict on fits that fail outside their own scenes, on made-up numbers."""
 
 import pytest
 

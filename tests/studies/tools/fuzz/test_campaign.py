@@ -1,4 +1,4 @@
-"""The stress campaign as a whole: every trial once, whatever happens to a process; its table, chart and command."""
+"""The stress campaign as a whole: every trial once, even if a process dies; its table, chart and command."""
 
 import os
 
@@ -24,9 +24,9 @@ def deadly(attempt, trials):
 def test_a_process_that_dies_costs_its_trial_alone(monkeypatch):
     monkeypatch.setattr(campaign, "CHUNK", 2)
     monkeypatch.setattr(campaign, "try_all", deadly)
-    heard = []
-    outcomes = run_trials([drawn(0, number) for number in range(4)], 2, heard.append)
-    assert [outcome.trial.number for outcome in outcomes] == list(range(4)) and len(heard) == 4
+    reports = []
+    outcomes = run_trials([drawn(0, number) for number in range(4)], 2, reports.append)
+    assert [outcome.trial.number for outcome in outcomes] == list(range(4)) and len(reports) == 4
     assert [outcome.trial.number for outcome in outcomes if outcome.status == UNEXPLAINED] == [DEADLY]
     assert "died" in outcomes[DEADLY].message
 

@@ -1,4 +1,4 @@
-"""The silicone beam: how its files are read, what its numbers are, and that both solvers have one beam."""
+"""The silicone beam: how its files are read, its numbers, and the same beam in both solvers."""
 
 from pathlib import Path
 
