@@ -33,7 +33,7 @@ def test_a_run_that_ended_early_has_no_numbers(entry, status):
     assert np.isnan(entry(run(status=status, timing=timing)))
 
 
-def test_names_are_unique_and_studies_use_no_others():
+def test_names_are_unique_and_studies_use_known_ones():
     assert len({m.name for m in METRICS}) == len(METRICS)
     for study in STUDIES:
         assert all(isinstance(metric(name), Metric) for name in study.columns)
