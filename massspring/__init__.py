@@ -1,8 +1,9 @@
-"""Mass-spring bodies that keep their volume: Jung, Hong, Choi (2005). Knows no file, no plot, no scene.
+"""Mass-spring bodies that keep their volume: Jung, Hong, Choi (2005). It reads no files, draws no plots and has no
+notion of a scene.
 
-`massspring.sources` alone names the packages around it: it fingerprints their code.
+Only `massspring.sources` names the other packages of this distribution: it computes hashes of their code.
 
-The public names are those of the stub, `__init__.pyi`, and the methods; a name loads its module when it is first used.
+The public names are those in the stub `__init__.pyi` and the methods. Each name loads its module on first use.
 """
 
 from importlib import import_module

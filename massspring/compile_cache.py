@@ -1,7 +1,7 @@
-"""Where compiled code is kept between processes, and when it is out of date.
+"""The cache of compiled code between processes: its folder, and when an entry is out of date.
 
-numba itself compares the file of a function, not the files which that imports, and takes a new comment for new code.
-Here the state of all code that can be compiled into a function decides (massspring.sources).
+numba itself compares only the file of a function, ignores the files that it imports, and recompiles after a changed
+comment. Here the hash of all code that can be compiled into a function decides (massspring.sources).
 """
 
 import contextlib
@@ -15,7 +15,7 @@ from numba.core import caching, config
 from massspring.sources import cache_folder, own_file, source_fingerprint
 
 COMPILED = ("massspring.kernels", "massspring.methods", "reference_fem")
-"""Where compiled functions and the constants in them live; a compiled function uses nothing else (tested)."""
+"""Packages that define compiled functions and their constants; a compiled function uses nothing else (tested)."""
 
 ARGUMENTS = (
     "massspring.kernels.arrays.volume_rows",
@@ -27,11 +27,11 @@ ARGUMENTS = (
     "massspring.kernels.points.arrays",
     "massspring.kernels.step.frame",
 )
-"""Modules that define, or import, the named tuples which kernels are given.
+"""Modules that define, or import, the named tuples that kernels take as arguments.
 
-A kernel need not import the type of its argument, and numba knows a named tuple by its name and the types in it: with
-two fields of one type exchanged, code that was kept would take one for the other. The reference's functions import
-what they are given.
+A kernel need not import the type of its argument, and numba identifies a named tuple by its name and field types. If
+two fields of one type change places, cached code would confuse them. Functions of the reference import the types of
+their arguments.
 """
 
 
@@ -42,7 +42,7 @@ def folder() -> Path:
 
 
 _ready: set[str] = set()
-"""Folders that were made, or can be written to, in this process."""
+"""Cache folders that this process has made, or has found to be writable."""
 
 
 class ByMeaning(caching.UserProvidedCacheLocator):
@@ -62,7 +62,7 @@ class ByMeaning(caching.UserProvidedCacheLocator):
             _ready.add(self._cache_path)
 
     def get_source_stamp(self) -> str:
-        """What the stored code must have been compiled from."""
+        """Hash of the code that a cache entry must have been compiled from."""
         return self._stamp
 
     def get_disambiguator(self) -> str:
@@ -71,7 +71,7 @@ class ByMeaning(caching.UserProvidedCacheLocator):
 
     @classmethod
     def from_function(cls, py_func: Callable[..., Any], py_file: str) -> "ByMeaning | None":
-        """None for functions of others, which numba keeps in its own way."""
+        """None for functions of other packages: numba's default locators serve those."""
         if own_file(py_func.__module__) is None:
             return None
         return super().from_function(py_func, py_file)  # pyright: ignore[reportReturnType]
@@ -83,7 +83,7 @@ OTHERS = ",".join(locator.__name__ for locator in caching.CacheImpl._locator_cla
 
 @contextlib.contextmanager
 def kept() -> Iterator[None]:
-    """numba asks for its folder while it decorates; functions of other packages keep theirs."""
+    """Inside, numba's decorators use this cache for functions of this distribution, and its defaults for others."""
     before = config.CACHE_DIR, config.CACHE_LOCATOR_CLASSES  # pyright: ignore[reportAttributeAccessIssue]
     config.CACHE_DIR = str(folder())  # pyright: ignore[reportAttributeAccessIssue]
     config.CACHE_LOCATOR_CLASSES = f"{LOCATORS},{OTHERS}"  # pyright: ignore[reportAttributeAccessIssue]

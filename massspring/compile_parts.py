@@ -1,8 +1,8 @@
-"""How functions are compiled: for callers in Python by themselves, for compiled callers as a part of each.
+"""How functions are compiled: once for callers in Python, and inlined into each compiled caller.
 
-numba makes machine code of every function and then of its caller, which has taken the function in; that was half of
-all compiling. Here a function that compiled code calls gets machine code only where its callers have theirs. If Python
-calls it too, it is compiled once more, for Python. Nor is it compiled again for every constant that it is given.
+numba makes machine code of every function and again of each caller that inlines it; that took half of the compile time.
+Here a function that compiled code calls gets machine code only as part of its callers. If Python calls it too, it is
+compiled once more, for Python. It is not compiled again for each constant argument.
 """
 
 from collections.abc import Callable
@@ -23,7 +23,8 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 
 
 def kept_function(function: Function, **options: Any) -> Function:
-    """The function compiled on first call and kept on disk, with numba's `options`; as it is where that is off."""
+    """The function, compiled on first call and cached on disk, with numba's `options`; unchanged if numba is
+    disabled."""
     twin = FunctionType(
         function.__code__, function.__globals__, function.__name__, function.__defaults__, function.__closure__
     )
@@ -41,10 +42,10 @@ def kept_function(function: Function, **options: Any) -> Function:
 
 
 class Part(JITCodeLibrary):
-    """Code for callers; of what becomes machine code here, numba's own variables alone are left."""
+    """A code library that only callers link. It makes no machine code except for numba's environment variables."""
 
     def _optimize_final_module(self) -> None:
-        """Callers do that."""
+        """Nothing: callers optimise the code that they link."""
 
     def _finalize_final_module(self) -> None:
         whole, self._finalized = self._final_module, True
@@ -63,17 +64,17 @@ class _IntoPart(AnalysisPass):
         super().__init__()
 
     def run_pass(self, state: Any) -> bool:
-        """Gives what is compiled its library, before numba would."""
+        """Sets the code library of the function before numba would create one."""
         state.library = Part(state.targetctx.codegen(), state.func_id.func_qualname)
         state.library.enable_object_caching()
         return False
 
 
 class PartCompiler(CompilerBase):
-    """numba's compiler, for parts."""
+    """numba's compiler with `Part` as code library."""
 
     def define_pipelines(self) -> list[Any]:
-        """numba's own passes, and `_IntoPart`."""
+        """numba's default passes and `_IntoPart`."""
         passes = DefaultPassBuilder.define_nopython_pipeline(self.state)
         passes.add_pass_after(_IntoPart, IRLegalization)
         passes.finalize()

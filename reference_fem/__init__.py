@@ -1,6 +1,6 @@
-"""Nearly incompressible finite elements: the reference that the mass-spring models are judged by.
+"""Nearly incompressible finite elements: the reference with which the mass-spring models are compared.
 
-The public names are those of the stub, `__init__.pyi`; a name loads its module when it is first used.
+The public names are those in the stub `__init__.pyi`. Each name loads its module on first use.
 """
 
 from importlib import import_module

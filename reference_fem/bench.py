@@ -1,4 +1,4 @@
-"""How fast the reference is on this machine; functions return numbers, the caller pins the core and prints."""
+"""Benchmarks of the reference on this machine. The functions return numbers; the caller pins the core and prints."""
 
 import resource
 import time

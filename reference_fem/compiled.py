@@ -1,4 +1,5 @@
-"""The decorator of compiled functions: numba, kept on disk (massspring.compile_parts, which holds no mechanics)."""
+"""The decorator of compiled functions: numba with a cache on disk (massspring.compile_parts, which contains no
+mechanics)."""
 
 from collections.abc import Callable
 from typing import Any, TypeVar

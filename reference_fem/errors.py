@@ -1,4 +1,4 @@
-"""The exceptions of this package, and the one warning."""
+"""The exceptions of this package, and its only warning."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -20,4 +20,4 @@ class SingularTangent(SolveError):
 
 
 class SlowSolverWarning(UserWarning):
-    """The fast sparse factorisation is missing; answers are the same, only slower."""
+    """The fast sparse factorisation is missing; results are the same, but take longer."""

@@ -17,8 +17,8 @@ from reference_fem.system.saddle_point import System
 def stress_indicator(system: System, x: np.ndarray) -> np.ndarray:
     """∫ |P − P*|² dV of each element [Pa² m³], (ne,): nominal stress P against its recovery P*.
 
-    x: unknowns of an equilibrium (total,). It ranks elements; it is no estimate of the error of a force: its sum is 20
-    to 35 times that (docs/theory.md, section 6).
+    x: unknowns of an equilibrium (total,). Use it only to rank elements. It does not estimate the error of a force: its
+    sum is 20 to 35 times that error (docs/theory.md, section 6).
     """
     mesh, weights = system.problem.mesh, system.elements.weights
     F, p = assembly.deformation(x[: system.field_count], system.elements, system.problem.material.kappa)

@@ -1,4 +1,5 @@
-"""Closed forms and converged tables that the solver is held against (docs/theory.md, oracles). SI units throughout."""
+"""Closed forms and converged tables with which the solver is compared (docs/theory.md, oracles). SI units
+throughout."""
 
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -97,7 +98,7 @@ def ball_spheroidal(poisson: float, n: int = 2):
 
     def traction(y: float):
         x = slowness * y
-        # j_{n+1}(x) x / j_n(x), which vanishes where nothing can be compressed
+        # j_{n+1}(x) x / j_n(x), which vanishes for an incompressible body
         ratio = x * spherical_jn(n + 1, x) / spherical_jn(n, x) if x > 0.0 else 0.0
         shear, next_shear = spherical_jn(n, y), y * spherical_jn(n + 1, y)
         normal = (n * n - n - 0.5 * y * y + 2.0 * ratio) * ((n * n - 1 - 0.5 * y * y) * shear + next_shear)

@@ -1,7 +1,9 @@
-"""How far a number may be from the truth: the share of the mesh from a family of three, other shares from one change.
+"""Uncertainty of a number: the share of the mesh from a family of three meshes, other shares from one change of a
+setting.
 
-The mesh: grid convergence index of Roache (J. Fluids Eng. 116, 1994) as Celik et al. (J. Fluids Eng. 130, 078001,
-2008) write it down, for sizes of any ratio and for fields as well as numbers. Plain arrays, no mesh, no solver.
+The mesh: grid convergence index of Roache (J. Fluids Eng. 116, 1994) in the form of Celik et al. (J. Fluids Eng. 130,
+078001, 2008), for any ratio of sizes and for fields as well as numbers. The functions take plain arrays and need no
+mesh or solver.
 """
 
 from collections.abc import Mapping, Sequence
@@ -14,38 +16,39 @@ from scipy.optimize import nnls, root_scalar
 from reference_fem.errors import SolveError
 
 SAFETY, TWO_MESHES = 1.25, 3.0
-"""Factors on the extrapolated error, of three meshes and of two, whose order is a guess (Roache)."""
+"""Factors on the extrapolated error: SAFETY for three meshes, TWO_MESHES for two, whose order is assumed (Roache)."""
 UNCONFIRMED = 2.0
-"""The same of three meshes that come together faster than any order that is believed: parts of either sign may cancel
-in the finest two. The clamped ball was 1.3 times farther off than SAFETY would allow (docs, section 6)."""
+"""The factor for three meshes that converge faster than any plausible order: errors of opposite sign may cancel in the
+finest two. The clamped ball was 1.3 times farther off than SAFETY would allow (docs, section 6)."""
 SCATTER = 2.0
-"""Factor on the spread of values that go to and fro: the range of three is on average 1.7 of their standard deviation,
-and the finest may be two of these off."""
+"""Factor on the spread of values that oscillate: the range of three is on average 1.7 of their standard deviation,
+and the finest may be off by two of these."""
 SLOWEST, FASTEST = 1.0, 3.0
-"""Range of orders in the element size that are believed; 3 is that of the displacement of quadratic elements."""
+"""Range of plausible orders in the element size; 3 is that of the displacement of quadratic elements."""
 NESTED_RATE = 2.0 / 3.0
-"""Power of the unknowns by which the error of nested, adaptively bisected meshes is taken to fall. In theory it is 1
-where outlines of held regions dominate, 4/3 elsewhere; the marks of a single step decide too much for a rate to be
-observed in three values (docs/theory.md, section 6)."""
+"""Assumed power of the number of unknowns with which the error of nested, adaptively bisected meshes falls. In theory
+it is 1 if outlines of held regions dominate, else 4/3. A rate cannot be observed from three values, which depend too
+much on the marking of single steps (docs/theory.md, section 6)."""
 Range = tuple[float, float]
-"""Slowest and fastest order that are believed."""
+"""Slowest and fastest plausible order."""
 BELIEVED: Range = (SLOWEST, FASTEST)
 ORDERS = 81
 """Orders tried for a field, at most 0.025 apart: the error bar then changes by under 1 % from one to the next."""
 ALIKE = 0.5
-"""Cosine of two changes of a series above which they go the same way: one and the same error has 1."""
+"""Cosine of two changes of a series above which they count as having the same direction; for a single error term it is
+1."""
 
 
 @dataclass(frozen=True)
 class MeshError:
-    """What three meshes say about the finest of them, in the unit of the values."""
+    """The error of the finest of three meshes, in the unit of the values."""
 
     uncertainty: float
-    """Of the finest value."""
+    """Uncertainty of the finest value."""
     shift: float
-    """Extrapolated minus finest value, for fields the size of it; 0 where nothing can be extrapolated."""
+    """Extrapolated minus finest value, for fields the norm of this; 0 if extrapolation is not possible."""
     order: float
-    """Observed, of those that are believed; NaN where the values go to and fro: the spread then counts."""
+    """Observed order, limited to the plausible range; NaN if the values oscillate, and the spread is used."""
 
     @property
     def monotone(self) -> bool:
@@ -73,10 +76,10 @@ def nested_error(unknowns: Sequence[float], changes: Sequence[float]) -> float:
 def observed_order(
     sizes: Sequence[float], coarse_change: float, fine_change: float, believed: Range = BELIEVED
 ) -> float:
-    """Order p of |f − f_h| ~ h^p from the sizes h1 < h2 < h3 and |f3 − f2|, |f2 − f1|, within what is believed.
+    """Order p of |f − f_h| ~ h^p from the sizes h1 < h2 < h3 and |f3 − f2|, |f2 − f1|, within the range `believed`.
 
     With r = h2/h1, R = h3/h2 the changes are in the ratio r^p (R^p − 1)/(r^p − 1), which grows with p.
-    Raises SolveError for sizes that are not three different ones.
+    Raises SolveError unless there are three different sizes.
     """
     r, R = _ratios(sizes)
     slowest, fastest = believed
@@ -94,11 +97,11 @@ def observed_order(
 def mesh_error(sizes: Sequence[float], values: Sequence, believed: Range = BELIEVED) -> MeshError:
     """Error of the finest of two or three values of a number, or of a series of them (n,), fine to coarse.
 
-    sizes: h1 < h2 (< h3) [m]; believed: range of orders. Changes that go the same way: the grid
-    convergence index SAFETY |f2 − f1|/(r^p − 1). Otherwise SCATTER times the spread, the largest difference of two.
-    A fine change that is small by chance does not make the bar small: |f3 − f1|/((rR)^p − 1), R = h3/h2, counts where
-    it is larger, as it is for an order faster than believed. Two values: the slowest order, safety TWO_MESHES.
-    Raises SolveError for sizes that do not grow, and values that are not finite.
+    sizes: h1 < h2 (< h3) [m]; believed: range of orders. For changes in the same direction: the grid convergence index
+    SAFETY |f2 − f1|/(r^p − 1). Otherwise SCATTER times the spread, the largest difference of two. A fine change that is
+    small by chance does not make the error bar small: |f3 − f1|/((rR)^p − 1), R = h3/h2, is used if it is larger, as
+    for an order faster than plausible. Two values: the slowest order, safety TWO_MESHES. Raises SolveError for sizes
+    that do not grow, and values that are not finite.
     """
     values = _finite(values)
     near, ratios = values[1] - values[0], _ratios(sizes)
@@ -119,15 +122,16 @@ def field_error(sizes: Sequence[float], values: Sequence, weights: np.ndarray, b
     """Error of the finest of two or three fields (n, c) at the same n points of weight (n,), fine to coarse.
 
     Over hundreds of points two parts can be separated: f_i = f + a h_i^p + b_i, where a is the same field on every
-    mesh and b_i, of size b h_i^p, comes from where the elements of mesh i happen to lie. Then, with squares of norms,
+    mesh and b_i, of size b h_i^p, depends on the random positions of the elements of mesh i. Then, with squares of
+    norms,
 
         |f2 − f1|² = a² (h2^p − h1^p)² + b² (h1^2p + h2^2p), |f3 − f2|² alike,
         (f2 − f1)·(f3 − f2) = a² (h2^p − h1^p) (h3^p − h2^p) − b² h2^2p,
 
-    three equations for p, a², b², solved by least squares with a believed p and a², b² >= 0. The error
-    is SAFETY √(a² + b²) h1^p; without b this is the grid convergence index. Fields that come no closer have SCATTER
-    times the spread. The shift is the size of the part that could be extrapolated. Two fields: as mesh_error.
-    Raises SolveError for sizes that do not grow, and values that are not finite.
+    three equations for p, a², b², solved by least squares with p in `believed` and a², b² >= 0. The error
+    is SAFETY √(a² + b²) h1^p; without b this is the grid convergence index. Fields that do not converge get SCATTER
+    times the spread. The shift is the size of the part that could be extrapolated. Two fields: as mesh_error. Raises
+    SolveError for sizes that do not grow, and values that are not finite.
     """
     root = np.sqrt(weights)[:, None]
     scaled = [(value * root).ravel() for value in _finite(values)]
@@ -145,7 +149,7 @@ def field_error(sizes: Sequence[float], values: Sequence, weights: np.ndarray, b
 
 
 def _safety(order: float, believed: Range) -> float:
-    """Factor on an extrapolated error: one whose order is the fastest that is believed was not confirmed."""
+    """Factor on an extrapolated error: UNCONFIRMED if its order is the fastest in `believed`."""
     return SAFETY if order < believed[1] else UNCONFIRMED
 
 
@@ -159,7 +163,7 @@ def _parts(order: float, ratios: Sequence[float], products: np.ndarray) -> tuple
             [(middle - 1) * (coarse - middle), -(middle**2)],
         ]
     )
-    # Each equation counts with the accuracy it is known to, which is relative to the two changes it compares.
+    # Each equation is weighted by its accuracy, which is relative to the two changes that it compares.
     scale = np.array([products[0], products[1], np.sqrt(products[0] * products[1])])
     parts, misfit = nnls(rows / scale[:, None], products / scale)
     return float(misfit), parts
@@ -168,8 +172,8 @@ def _parts(order: float, ratios: Sequence[float], products: np.ndarray) -> tuple
 def setting_error(change: float, factor: float) -> float:
     """Error left by a setting that was made `factor` times better, of order one in it: |change|/(1 − 1/factor).
 
-    Holds for what contact's penalty and the bulk modulus leave, both ~ 1/setting, and bounds what load steps leave.
-    Raises SolveError for a factor that makes nothing better.
+    Holds for the errors by the contact penalty and the bulk modulus, both ~ 1/setting, and is an upper bound for that
+    by load steps. Raises SolveError for a factor that is not above 1.
     """
     if not factor > 1:
         raise SolveError(f"a setting made {factor} times better tells nothing: the factor must be above 1")

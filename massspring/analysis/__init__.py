@@ -1,1 +1,1 @@
-"""What a body will do before it runs: stiffness, step limit, modes."""
+"""Analysis of a body at rest, before a run: stiffness, step limit, modes."""

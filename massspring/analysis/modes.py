@@ -1,4 +1,4 @@
-"""Natural frequencies of a body whose volumes are kept: how it rings."""
+"""Natural frequencies and modes of a body whose volumes are kept."""
 
 import numpy as np
 from scipy.sparse import block_array, csr_array, diags_array, eye_array
@@ -9,7 +9,7 @@ from massspring.body.body import Body
 from massspring.errors import MassSpringError
 
 SOFTNESS = 1e-10
-"""Relative compliance of the kept volumes: where some depend on others the system stays regular."""
+"""Relative compliance added to the kept volumes, so that the system is regular even if some depend on others."""
 
 
 def natural_frequencies(body: Body, count: int, keep: bool = True) -> tuple[np.ndarray, np.ndarray]:

@@ -12,7 +12,7 @@ from massspring.body.body import Body
 from massspring.errors import MassSpringError
 
 LANCZOS_TOLERANCE = 1e-4
-"""Relative accuracy of ω²; far below the 1 % to which a nonlinear run knows its limit."""
+"""Relative accuracy of ω²; far below 1 %, the accuracy to which the linear limit holds in a nonlinear run."""
 
 
 def scaled_stiffness(body: Body, held_nodes: np.ndarray) -> csr_array:

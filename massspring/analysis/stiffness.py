@@ -1,4 +1,4 @@
-"""The stiffness matrix of a body: what its forces change by when its nodes move a little."""
+"""The stiffness matrix of a body: minus the derivative of the forces by the node positions."""
 
 import numpy as np
 from scipy.sparse import coo_array, csr_array

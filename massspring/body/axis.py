@@ -18,8 +18,8 @@ FAR_SWEEPS = 4
 def virtual_nodes(points: np.ndarray, triangles: np.ndarray, spacing: float, axis: str = "straight") -> np.ndarray:
     """Nodes [m], (a, 3), along the axis of a closed surface, about `spacing` [m] apart and in order.
 
-    `points` (n, 3) [m], `triangles` (f, 3). The paper's axis follows "the organ's topology": "straight" serves a
-    compact organ (ball, liver, spleen), "centre_line" a bent one (stomach). Raises MassSpringError for another word.
+    `points` (n, 3) [m], `triangles` (f, 3). The paper's axis follows "the organ's topology": "straight" suits a compact
+    organ (ball, liver, spleen), "centre_line" a bent one (stomach). Raises MassSpringError for any other `axis`.
     """
     if axis == "straight":
         return _straight(points, spacing)

@@ -1,7 +1,7 @@
 """The paper's surface body cut in pieces: closed surfaces with caps on the section, springs across it gone.
 
-What is new at the cut, nodes on the caps and springs to them, takes nothing from the body but mass: it begins where
-the nodes around it are and without force. So the elastic energy falls by that of the springs that are cut.
+New nodes on the caps and the springs to them take only mass from the body. A new node starts at a position interpolated
+from the nodes around it, a new spring starts without force. So the elastic energy falls by that of the cut springs.
 """
 
 from dataclasses import dataclass
@@ -19,21 +19,24 @@ from massspring.body.volumes import Volumes
 from massspring.errors import MassSpringError
 
 NEW = -1
-"""The parent of what had none."""
+"""Parent number of a node that was not in the body before the cut."""
 
 
 @dataclass(frozen=True, eq=False)
 class Growth:
-    """What a body gains when it is cut, beyond copies of its nodes and springs."""
+    """New nodes and springs that a cut adds to a body, beyond copies of existing ones."""
 
     carry: csr_array
-    """Its places by those before, (n', n): a single 1 for a copy, weights that add up to 1 for a new node."""
+    """Weights that give the positions of its nodes from those before the cut, (n', n): a single 1 in the row of a copy,
+    weights that add up to 1 in that of a new node."""
     mass: np.ndarray
-    """What each node has of its parent's mass [kg], (n',); 0 for new ones, which take theirs from their piece."""
+    """Part of its parent's mass that each node gets [kg], (n',); 0 for a new node, whose mass is taken from its
+    piece."""
     piece: np.ndarray
-    """The piece of each node, (n',): it keeps its momentum and its angular momentum."""
+    """Number of the piece of each node, (n',). The cut keeps momentum and angular momentum of each piece."""
     springs: np.ndarray
-    """Numbers of new springs, (q,): they begin without force, then their rest lengths are led to those at rest."""
+    """Numbers of new springs, (q,). They start without force; then their rest lengths move to those of the rest
+    shape."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,22 +44,22 @@ class Pieces:
     """The paper's body after a cut."""
 
     body: Body
-    """The nodes of all surfaces first, then those on axes; it keeps the volume of each piece."""
+    """Nodes of all surfaces first, then those on axes. The volume of each piece is kept."""
     parent: np.ndarray
-    """For each node the one it was, (n',); for a new one the one that carries most of it."""
+    """For each node its node before the cut, (n',); for a new node the one with the largest weight in `carry`."""
     growth: Growth
 
 
 def cut_surface(
     body: Body, points: np.ndarray, triangles: np.ndarray, parent: np.ndarray, axis: str = "straight"
 ) -> Pieces:
-    """The pieces of `body`, made by `surface_body`, within the closed surfaces `triangles` (f', 3) of nodes at `points`
-    (s', 3) [m] at rest.
+    """Cuts `body`, made by `surface_body`, into the pieces bounded by the closed surfaces `triangles` (f', 3) of nodes
+    at rest positions `points` (s', 3) [m].
 
-    `parent` (s',): the node of the body's surface that each was; larger numbers name nodes of the section, each in two
-    pieces. Nodes on the axis stay in their piece, springs within a piece stay as they are, those in the section are
-    shared by both. A new spring is as stiff as others of its kind; a piece without a node on the axis gets an `axis` of
-    its own. Raises MassSpringError for another body, and for surfaces that are one piece.
+    `parent` (s',): the surface node of `body` that each node was; larger numbers are new nodes on the section, and each
+    of these is in two pieces. Axis nodes stay in the piece that contains them. Springs within a piece do not change;
+    two pieces share those in the section. A new spring is as stiff as others of its kind. A piece without axis nodes
+    gets a new `axis`. Raises MassSpringError for a body of another kind, and for surfaces that form a single piece.
     """
     first = len(body.surface_nodes)
     if len(body.tetrahedra) or len(_ends(body, SpringKind.INNER)) != first:  # one for each node of the surface
@@ -104,7 +107,7 @@ def _pieces(triangles: np.ndarray, count: int) -> np.ndarray:
 
 
 def _section(before: np.ndarray, triangles: np.ndarray, was: np.ndarray) -> np.ndarray:
-    """Which triangles are none of those `before` (f, 3), (f',) bool."""
+    """Which triangles are not among those `before` (f, 3), (f',) bool."""
     old = set(map(tuple, np.sort(before.astype(np.int64), axis=1).tolist()))
     return np.array([tuple(row) not in old for row in np.sort(was[triangles], axis=1).tolist()])
 
@@ -112,7 +115,7 @@ def _section(before: np.ndarray, triangles: np.ndarray, was: np.ndarray) -> np.n
 def _axes(
     body: Body, points: np.ndarray, triangles: np.ndarray, piece: np.ndarray, axis: str
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Nodes on axes [m], (a', 3), those of the body first, the nodes they were, and their pieces."""
+    """Axis nodes [m], (a', 3), existing ones first; the node that each was (NEW for new ones); the piece of each."""
     first, count = len(body.surface_nodes), piece.max() + 1
     surfaces = [triangles[piece[triangles[:, 0]] == k] for k in range(count)]
     old = body.rest[first:]
@@ -181,7 +184,7 @@ def _masses(
     section: np.ndarray,
     to: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Masses of the pieces, and what each node has of that of its parent [kg], both (n',).
+    """Masses of the nodes of the pieces, and the part of its parent's mass that each node gets [kg], both (n',).
 
     Copies share by the area on their side. The surface of a piece then gives to the section what that has of the
     piece's area, and to nodes of a new axis the share that axes have."""
@@ -215,7 +218,8 @@ def _carried(
     section: np.ndarray,
     triangles: np.ndarray,
 ) -> csr_array:
-    """Where nodes are by those before, (n', n): on the section by its outline, on a new axis by the piece's surface."""
+    """Weights that give node positions from those before, (n', n): on the section from its outline, on a new axis from
+    the surface of the piece."""
     count = len(parent)
     rows, columns = np.flatnonzero(was >= 0), was[was >= 0]
     entries = [(rows, columns, np.ones(len(rows)))]
@@ -238,7 +242,8 @@ def _carried(
 
 
 def harmonic(points: np.ndarray, triangles: np.ndarray, first: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Nodes from number `first` on, the others of `triangles` (f, 3), and by how much these carry those, (i, o).
+    """(inner nodes, outer nodes, weights (i, o)): harmonic weights of the nodes numbered from `first` on by the other
+    nodes of `triangles` (f, 3).
 
     Σ over the nodes around each of w_ij (x_j − x_i) = 0 with w_ij = ½ (cot a + cot b) of the angles opposite to the
     edge at rest (Pinkall, Polthier 1993): every linear function, so each place at rest, is met exactly.
@@ -259,7 +264,7 @@ def harmonic(points: np.ndarray, triangles: np.ndarray, first: int) -> tuple[np.
 
 
 def affine(points: np.ndarray, places: np.ndarray) -> np.ndarray:
-    """The smallest weights of `points` (p, 3) that add up to 1 and meet each of `places` (q, 3), (q, p)."""
+    """The smallest weights of `points` (p, 3) that add up to 1 and reproduce each of `places` (q, 3), (q, p)."""
     conditions = np.column_stack([np.ones(len(points)), points - points.mean(axis=0)])
     right = np.column_stack([np.ones(len(places)), places - points.mean(axis=0)])
     return right @ np.linalg.pinv(conditions)

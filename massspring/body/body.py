@@ -16,9 +16,11 @@ from massspring.kernels.forces.tetrahedra import smallest_ratio
 from massspring.kernels.forces.volume import enclosed_volume, volume_gradient_into
 
 SAME_VOLUME = 1e-9
-"""Relative: both are sums of the same determinants, up to round-off of some million additions."""
+"""Relative difference below which two volumes are equal: both are sums of the same determinants and differ by round-off
+of some million additions."""
 BALANCED = 1e-8
-"""Of the largest force at a node: far above round-off, far below one spring too many."""
+"""Net force at rest allowed at a node, over the largest force of a node: far above round-off, far below the force of
+one surplus spring."""
 NO_MEMBRANE = Membrane(np.empty((0, 3), dtype=np.uint32), *(np.empty((0, 3)) for _ in range(3)))
 NO_TETRAHEDRA = np.empty((0, 4), dtype=np.uint32)
 NO_FACETS = np.empty((0, 6), dtype=np.uint32)
@@ -65,7 +67,7 @@ class Body:
     law: str = "given"
     """Stiffness law, recorded with every result: it alone moves a force by 12–16 %."""
     volumes: Volumes | PointVolumes | None = None
-    """What methods keep; None: the whole."""
+    """The volumes that methods keep; None: the whole volume."""
     rest_pressure: float = 0.0
     """Pressure that balances springs without length at rest [Pa]; 0 for springs that rest at their own length."""
     membrane: Membrane = NO_MEMBRANE
@@ -73,9 +75,10 @@ class Body:
     local_bulk: float = 0.0
     """b [Pa]: a pressure −b (J_q − 1) at the points of `PointVolumes`, added to that of the volumes."""
     contact_facets: np.ndarray = field(default_factory=lambda: NO_FACETS)
-    """Quadratic facets at whose points obstacles touch a body of `PointVolumes`, (f, 6); of none: at its nodes."""
+    """Quadratic facets at whose points obstacles touch a body of `PointVolumes`, (f, 6). If empty, obstacles touch
+    nodes."""
     inertia: np.ndarray | None = None
-    """What resists motion [kg], (n,), where that is not `mass`: weight is always that of `mass`."""
+    """Inertial mass of the nodes [kg], (n,), if it differs from `mass`; gravity always acts on `mass`."""
     share: np.ndarray | None = None
     """Part of each tetrahedron that is tissue [1], (k,), where copies of cells share it (`virtual_nodes`); `triangles`
     are then the surface before the cut, on the nodes that were there. None: all of each."""
@@ -133,7 +136,7 @@ class Body:
             self._check_balance()
 
     def _check_balance(self) -> None:
-        """Springs that are taut at rest are held apart by the rest pressure, at every node."""
+        """Raises MassSpringError unless the rest pressure balances the springs that are taut at rest, at every node."""
         springs, pull, push = self.springs, np.empty_like(self.rest), np.empty_like(self.rest)
         spring_forces_into(self.rest, springs.ends, springs.rest_length, springs.stiffness, pull)
         if isinstance(self.kept, PointVolumes) or self.share is not None:
@@ -174,7 +177,8 @@ class Body:
 
     @cached_property
     def rest_lam(self) -> np.ndarray:
-        """What each kept volume takes of the rest pressure [Pa], (m,): Jᵀ rest_lam = rest_pressure · dV/dx."""
+        """Multiplier of each kept volume that yields the rest pressure [Pa], (m,): Jᵀ rest_lam = rest_pressure ·
+        dV/dx."""
         if not self.rest_pressure:
             return np.zeros(self.kept.count)
         if self.share is not None:  # nodal ones, or those of the pieces; `_check_balance` holds them to it
@@ -183,7 +187,7 @@ class Body:
 
     @property
     def moved_mass(self) -> np.ndarray:
-        """What resists motion [kg], (n,): `inertia`, or `mass`."""
+        """Inertial mass of the nodes [kg], (n,): `inertia` if given, else `mass`."""
         return self.mass if self.inertia is None else self.inertia
 
     def local_energy(self, x: np.ndarray) -> float:
@@ -194,7 +198,7 @@ class Body:
 
     @property
     def rest_energy(self) -> float:
-        """Energy of springs that are taut at rest [J]; energies are reported above it."""
+        """Energy at rest of springs that are taut at rest [J]; reported energies are relative to it."""
         springs = self.springs
         return float(spring_energy(self.rest, springs.ends, springs.rest_length, springs.stiffness))
 

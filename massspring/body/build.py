@@ -1,4 +1,5 @@
-"""Bodies made from meshes: springs, stiffnesses and masses of organs filled with tissue, and of the paper's."""
+"""Builds bodies from meshes, with springs, stiffnesses and masses: organs filled with tissue, and the paper's surface
+body."""
 
 from collections.abc import Sequence
 

@@ -1,4 +1,4 @@
-"""Where a point lies: inside a closed surface or not, and how far from it."""
+"""Whether a point lies inside a closed surface, and its distance from the surface."""
 
 import numpy as np
 
@@ -10,20 +10,20 @@ from massspring.kernels.probe.point_query import distance_to
 
 
 def mean_edge(body: Body) -> float:
-    """Of the surface at rest [m]."""
+    """Mean edge length of the surface at rest [m]."""
     return float(lengths(body.rest, unique_edges(body.triangles, EDGES_OF_TRIANGLE)).mean())
 
 
 def new_pair() -> Pair:
-    """One for everything: each point and triangle overwrites it."""
+    """Scratch for one point and one triangle; every call overwrites it."""
     return Pair(np.zeros((2, 3)), np.zeros((3, 3)), np.zeros((3, 3)), np.zeros((3, 3)), np.zeros(3), np.zeros(3))
 
 
 def surface_distance(point: np.ndarray, x: np.ndarray, triangles: np.ndarray) -> float:
-    """Of a point (3,) to a surface [m]."""
+    """Distance of a point (3,) to a surface [m]."""
     return float(distance_to(point, x, triangles, np.zeros((3, 3)), np.zeros(3)))
 
 
 def is_inside(point: np.ndarray, x: np.ndarray, triangles: np.ndarray) -> bool:
-    """Whether the surface goes round the point."""
+    """Whether the closed surface encloses the point (3,)."""
     return abs(winding_number(point, x, triangles)) > 0.5

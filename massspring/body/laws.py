@@ -1,7 +1,8 @@
-"""Stiffness laws: what a mesh and a shear modulus make of each spring (docs/theory.md, section 4).
+"""Stiffness laws: the stiffness of each spring from the mesh and the shear modulus (docs/theory.md, section 4).
 
 *Matched* laws are scaled so that affine homogenisation gives the tissue's shear modulus, Σ k L² = 15 V mu (eq. 4.1);
-*published* ones are taken as their authors wrote them, with the Young's modulus such a network has, E = 2.5 mu.
+*published* ones are used as their authors wrote them, with the Young's modulus of a network of central forces, E = 2.5
+mu.
 """
 
 from collections.abc import Callable, Mapping
@@ -81,7 +82,7 @@ def van_gelder(edges: Edges, mu: float) -> np.ndarray:
 def lloyd(edges: Edges, mu: float) -> np.ndarray:
     """k_e = Σ_t∋e (2√2/25) E L_e [N/m], (s,) (Lloyd, Székely, Harders 2007; eq. 4.3), as published.
 
-    Of a regular tetrahedron it makes 0.96 of the shear modulus, of those of a mesh generator about 1.2 times it.
+    A regular tetrahedron gets 0.96 times the shear modulus, tetrahedra of a mesh generator about 1.2 times it.
     """
     return 2.0 * np.sqrt(2.0) / 25.0 * YOUNG * mu * edges.summed(np.ones((1, 1))) * edges.length
 

@@ -1,7 +1,7 @@
-"""A mesh opened along some of its inner faces: nodes are doubled, cells stay what they are.
+"""Opens a mesh along some of its inner faces: nodes are doubled, the cells do not change.
 
-Masses, springs and volumes of a body are sums over its cells, so those of the opened mesh add up to those of the mesh
-before, and positions and velocities go over by `x[parent]`, `v[parent]` without a change of momentum or energy.
+Masses, springs and volumes of a body are sums over its cells, so the opened mesh has the same totals. Positions and
+velocities of its nodes are `x[parent]` and `v[parent]`; momentum and energy do not change.
 """
 
 from dataclasses import dataclass
@@ -25,16 +25,16 @@ class Opening:
     """The cells of a mesh whose cut faces have become part of its boundary."""
 
     cells: np.ndarray
-    """(k, 4) or (k, 10) uint32, each in the place and with the order that it had."""
+    """Nodes of each cell, (k, 4) or (k, 10) uint32; the order of cells and of the nodes in a cell does not change."""
     parent: np.ndarray
-    """For each node the one it was, (n',); the first n are themselves."""
+    """For each node its node before the opening, (n',); the first n nodes keep their numbers."""
     pairs: np.ndarray
     """Nodes that keep their number, behind the faces, and their copies in front of them, (p, 2)."""
 
 
 def parents(before: np.ndarray, after: np.ndarray) -> np.ndarray:
-    """For each number in `after` (k, c) the one in its place in `before` (k, c), (n',): nodes of cells, or their
-    volumes."""
+    """For each number in `after` (k, c) the number at the same position in `before` (k, c), (n',). The numbers are
+    nodes of cells, or volumes of cells."""
     parent = np.empty(int(after.max()) + 1, dtype=np.int64)
     parent[after.ravel()] = before.ravel()
     return parent
@@ -44,8 +44,9 @@ def opened(cells: np.ndarray, faces: np.ndarray, n: int) -> Opening:
     """The mesh of `cells` (k, 4) or (k, 10) over `n` nodes, opened along the inner `faces` (f, 3).
 
     A face is given by its three corners, seen anticlockwise from its front; all faces of a sheet have their fronts on
-    the same side. A node becomes as many as there are groups of cells around it that uncut faces join, so those of the
-    front of a cut stay one. Raises MassSpringError for a face that no two cells share, and for one that would not open.
+    the same side. A node is split into as many nodes as there are groups of cells around it that uncut faces join, so a
+    node on the front of a cut stays single. Raises MassSpringError for a face that no two cells share, and for one that
+    would not open.
     """
     cells, faces = np.asarray(cells, dtype=np.int64), np.asarray(faces, dtype=np.int64)[:, :3]
     of_face = OF_FACE if cells.shape[1] == 4 else OF_QUADRATIC_FACE
@@ -88,7 +89,7 @@ def _places(faces: np.ndarray, mesh_faces: np.ndarray, second: np.ndarray, n: in
 
 
 def _sense(triangles: np.ndarray) -> np.ndarray:
-    """+1 where the three numbers ascend cyclically, −1 where they descend."""
+    """(f,): +1 where the three numbers ascend cyclically, −1 where they descend."""
     a, b, c = triangles.T
     return np.sign((b - a) * (c - b) * (c - a))
 
@@ -133,7 +134,7 @@ def _numbers(node: np.ndarray, behind: np.ndarray, n: int) -> np.ndarray:
 def _check_open(
     cells: np.ndarray, first: np.ndarray, second: np.ndarray, faces: np.ndarray, copied: np.ndarray
 ) -> None:
-    """Raises MassSpringError for a side inside the cut, or a face of it, both copies of which have the same nodes."""
+    """Raises MassSpringError if both copies of a face of the cut, or of an edge inside it, have the same nodes."""
     one, other = (
         np.sort(cells[place // 4, :][np.arange(len(place))[:, None], OF_FACE[place % 4]], axis=1)
         for place in (first, second)

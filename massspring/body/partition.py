@@ -19,7 +19,8 @@ TIE = 1e-9
 
 
 def tetrahedron_faces(tetrahedra: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Every face of `tetrahedra` (k, 4) once: its nodes (f, 3), outward of its first cell, and the two places it has.
+    """Every face of `tetrahedra` (k, 4) once: its nodes (f, 3), outward of its first cell, and its two places, (f,)
+    each.
 
     A place is 4 t + k: face k of cell t; the second one is −1 on the boundary. Raises MassSpringError for a face of
     three cells.

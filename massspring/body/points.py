@@ -75,7 +75,7 @@ class PointVolumes:
 
     @property
     def highest_node(self) -> int:
-        """Largest number of a node that is named."""
+        """Largest node number in use."""
         return int(self.cells.max())
 
     def deformation(self, x: np.ndarray) -> np.ndarray:
@@ -111,10 +111,10 @@ class PointVolumes:
         return self.weight[:, :, None, None] * np.einsum("kqij,kqaj->kqai", np.stack(columns, axis=-1), self.gradient)
 
     def parts_of(self, triangles: np.ndarray) -> np.ndarray:
-        """What each volume has in the tissue, (m,): 1 for each vertex, 0 for closed surfaces."""
+        """Factor of each volume in the volume of the tissue, (m,): 1 for each vertex, 0 for closed surfaces."""
         return np.r_[np.ones(self.vertex_count), np.zeros(self.count - self.vertex_count)]
 
     def renumbered(self, number: np.ndarray) -> "PointVolumes":
-        """The same volumes in the same order, with node i called `number[i]` (n,) uint32."""
+        """The same volumes in the same order, with node i renumbered to `number[i]`, (n,) uint32."""
         closed = None if self.closed is None else self.closed.renumbered(number)
         return replace(self, cells=number[self.cells], closed=closed)

@@ -1,4 +1,4 @@
-"""Springs: who is joined to whom, and how stiff.
+"""Springs: which nodes they join, and how stiff they are.
 
 Kinds follow Jung, Hong, Choi 2005: *structural* springs on the mesh edges, *bending* springs between the two nodes
 opposite a shared edge, *inner* springs from surface to axis; *solid* springs are the edges of a tetrahedral mesh.

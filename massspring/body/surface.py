@@ -1,4 +1,4 @@
-"""What makes a list of triangles a closed surface."""
+"""Checks that a list of triangles is a closed surface, and the winding number of a point."""
 
 import numpy as np
 
@@ -25,9 +25,10 @@ def check_finite(what: str, values: np.ndarray) -> None:
 
 
 def check_surface(points: np.ndarray, triangles: np.ndarray) -> None:
-    """Closed and consistently oriented: every directed edge once, its reverse once; outward: positive volume.
+    """Raises MassSpringError unless the surface is closed, consistently oriented (every directed edge occurs once, and
+    its reverse once) and outward (positive volume).
 
-    `points` (n, 3) [m], `triangles` (f, 3), one sheet or several. Raises MassSpringError.
+    `points` (n, 3) [m], `triangles` (f, 3), one sheet or several.
     """
     if len(triangles) < 4:
         raise MassSpringError(f"the surface has {len(triangles)} triangles; a closed one has at least 4")

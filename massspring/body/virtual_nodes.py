@@ -24,7 +24,7 @@ class VirtualNodes:
     """Copies of the k cells of a mesh of n nodes."""
 
     cells: np.ndarray
-    """Nodes of each copy in the order of its cell, (k', 4) uint32; those on its own side have their old numbers."""
+    """Nodes of each copy in the order of its cell, (k', 4) uint32; nodes on the side of the copy keep their numbers."""
     cell: np.ndarray
     """The cell that each is a copy of, ascending, (k',)."""
     side: np.ndarray
@@ -32,7 +32,7 @@ class VirtualNodes:
     share: np.ndarray
     """Part of the cell that each copy has, (k',): positive, 1 for all copies of a cell together."""
     parent: np.ndarray
-    """For each node the one it was, (n',); the first n are themselves, the others virtual."""
+    """For each node its node before the cut, (n',); the first n nodes keep their numbers, the others are virtual."""
 
 
 def part_in_front(level: np.ndarray) -> np.ndarray:
@@ -51,9 +51,9 @@ def part_in_front(level: np.ndarray) -> np.ndarray:
 def virtual_nodes(cells: np.ndarray, level: np.ndarray, parted: np.ndarray, part: np.ndarray) -> VirtualNodes:
     """The mesh of `cells` (k, 4) cut along a sheet.
 
-    `level` (n,): the side of the sheet that each node lies on, by its sign, and its distance, in any unit. `parted`
-    (n,) bool: which nodes lie behind the front of the cut. `part` (k,): what part of each cell's section is cut [1].
-    Raises MassSpringError for a node on the sheet, and for a cut that parts no cell.
+    `level` (n,): signed distance of each node from the sheet, in any unit. `parted` (n,) bool: which nodes lie behind
+    the front of the cut. `part` (k,): the part of each cell's section that is cut [1]. Raises MassSpringError for a
+    node on the sheet, and for a cut that parts no cell.
     """
     cells = np.asarray(cells, dtype=np.int64)
     if (level == 0).any():
@@ -78,8 +78,8 @@ def virtual_nodes(cells: np.ndarray, level: np.ndarray, parted: np.ndarray, part
 
 
 def _joined(cells: np.ndarray, cell: np.ndarray, side: np.ndarray, level: np.ndarray) -> np.ndarray:
-    """The group of each corner of each copy, (k', 4): corners at one node are one where a face joins two copies of the
-    same side, which both have tissue on it."""
+    """The group of each corner of each copy, (k', 4). Corners at the same node are in one group if two copies of the
+    same side share a face on which both have tissue."""
     _, first, second = tetrahedron_faces(cells)
     first, second = first[second >= 0], second[second >= 0]
     nodes = cells[(first // 4)[:, None], FACES_OF_TETRAHEDRON[first % 4]]

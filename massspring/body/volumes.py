@@ -1,8 +1,8 @@
-"""Which volumes a body keeps: the whole, wall and lumen, m regions, or one per node.
+"""The volumes that a body keeps: the whole, wall and lumen, m regions, or one per node.
 
-Each is a signed sum of oriented triangles, V_r = Σ_f s_rf (1/6) x_i · (x_j × x_k) (docs/theory.md, eq. 8.1), so that
-one sweep over triangles serves all kinds. A region is bounded by its own faces; the volume of a node, a quarter of
-every tetrahedron around it, is a quarter of what their outer faces enclose.
+Each is a signed sum of oriented triangles, V_r = Σ_f s_rf (1/6) x_i · (x_j × x_k) (docs/theory.md, eq. 8.1), so one
+sweep over triangles computes any kind. A region is bounded by its outer faces. The volume of a node is a quarter of the
+volume of all tetrahedra around it, so a quarter of the volume that their outer faces enclose.
 """
 
 from collections.abc import Mapping
@@ -23,7 +23,8 @@ DEPENDENT = 1e-8
 
 
 PATCH = 8
-"""Nodes of a patch; of more the inside would be too soft for springs without length, whose bulk is −mu/3 there."""
+"""Most nodes of a patch. The inside of a larger patch would be too soft for springs without length, whose bulk modulus
+there is −mu/3."""
 
 
 class Solid(Protocol):
@@ -72,11 +73,11 @@ class Volumes:
 
     @property
     def highest_node(self) -> int:
-        """Largest number of a node that is named."""
+        """Largest node number in use."""
         return int(self.triangles.max())
 
     def renumbered(self, number: np.ndarray) -> "Volumes":
-        """The same with node i called `number[i]` (n,) uint32."""
+        """The same volumes with node i renumbered to `number[i]`, (n,) uint32."""
         return replace(self, triangles=number[self.triangles])
 
     def jacobian(self, x: np.ndarray) -> csr_array:
@@ -90,7 +91,7 @@ class Volumes:
         return csr_array(self.share @ corner)
 
     def measure(self, x: np.ndarray) -> np.ndarray:
-        """V_r [m³] at positions `x` (n, 3) [m], seen from their mean (eq. 8.1), (m,)."""
+        """V_r [m³] at positions `x` (n, 3) [m], (m,) (eq. 8.1). Positions are taken relative to their mean."""
         corners = x[self.triangles] - x.mean(axis=0)
         return self.share @ np.einsum("ij,ij->i", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) / 6.0
 
@@ -201,7 +202,7 @@ class Volumes:
 
     @staticmethod
     def nodal(body: Solid) -> "Volumes":
-        """One volume per node: a quarter of every tetrahedron around it."""
+        """One volume per node: a quarter of the volume of every tetrahedron around it."""
         _need_tetrahedra(body, "nodal volumes")
         cells = body.tetrahedra.astype(np.int64)
         if body.share is not None:
@@ -231,7 +232,8 @@ def _need_tetrahedra(body: Solid, what: str) -> None:
 
 
 def _united(mine: np.ndarray, others: np.ndarray) -> tuple[np.ndarray, list[tuple[np.ndarray, np.ndarray]]]:
-    """Triangles of both lists, each once whatever its sense; for each list (place in the union, ±1 for the sense)."""
+    """The union of both lists of triangles, where orientation does not count, and for each list (index in the union, ±1
+    for the orientation)."""
     both = np.vstack([mine, others]).astype(np.int64)
     _, first, inverse = np.unique(np.sort(both, axis=1), axis=0, return_index=True, return_inverse=True)
     inverse = inverse.reshape(-1)

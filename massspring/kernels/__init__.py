@@ -1,5 +1,6 @@
-"""One equation per function, compiled: scalars and arrays in, arrays out; nothing here allocates or knows a scene.
+"""One equation per function, compiled: scalars and arrays in, arrays out; nothing here allocates memory or refers to a
+scene.
 
-Order of arguments: positions, topology, parameters, output. `add_…` adds to what it is given, `…_into` overwrites it.
+Order of arguments: positions, topology, parameters, output. `add_…` adds to its output array, `…_into` overwrites it.
 Equation numbers are those of docs/theory.md.
 """

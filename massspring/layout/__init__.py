@@ -1,1 +1,1 @@
-"""What is built once before a run, so that a step finds its data in order."""
+"""Arrays that are built once before a run, in the memory layout that a step needs."""

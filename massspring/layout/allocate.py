@@ -18,7 +18,8 @@ from massspring.layout.state import State
 from massspring.world.obstacles import Attachment
 
 CORRECTION_LIMIT = 0.3
-"""How far a step moves a node to make up for a wrong volume, in mean spring lengths: too little to turn a triangle."""
+"""Largest distance by which the correction of a volume error moves a node in a step, in mean spring lengths: too little
+to invert a triangle."""
 
 
 def start(
@@ -63,24 +64,26 @@ def _no_contacts(n: int) -> Contacts:
 
 
 def keeps_one(volumes: Volumes | PointVolumes) -> TypeGuard[Volumes]:
-    """Whether a division is enough: one closed surface."""
+    """Whether one volume inside a closed surface is kept, so that a division gives its multiplier."""
     return isinstance(volumes, Volumes) and volumes.count == 1 and bool((np.abs(volumes.share.data) == 1.0).all())
 
 
 def swept_surface(body: Body) -> np.ndarray:
-    """The closed surface on whose rings the springs are gathered, the one volume kept where it is one, (f, 3)."""
+    """The closed surface whose rings order the springs, (f, 3): that of the kept volume if it is a single one, else
+    that of the body."""
     return turned(body.kept) if keeps_one(body.kept) else body.triangles
 
 
 def turned(volumes: Volumes) -> np.ndarray:
-    """The triangles of one volume, all in the sense that encloses it, (f, 3) uint32."""
+    """The triangles of one volume, all oriented outward, (f, 3) uint32."""
     share = volumes.share.tocoo()
     triangles = volumes.triangles[share.col]
     return np.ascontiguousarray(np.where(share.data[:, None] > 0, triangles, triangles[:, ::-1]))
 
 
 def nodes_of(attachments: tuple[Attachment, ...], body: Body) -> list[np.ndarray]:
-    """Which nodes each attachment holds. Raises MassSpringError where they are none, not there or held twice."""
+    """The nodes that each attachment holds. Raises MassSpringError if there are none, if one does not exist, or if one
+    is held twice."""
     nodes = [np.asarray(a.nodes, dtype=np.int64) for a in attachments]
     for number, held in enumerate(nodes):
         if not len(held):
@@ -121,7 +124,7 @@ def _model(body: Body, attachments: tuple[Attachment, ...], surface: np.ndarray)
 
 
 def _mean_length(body: Body) -> float:
-    """Of all springs at rest [m], the edges of triangle springs among them."""
+    """Mean length of all springs at rest [m], including the edges of triangle springs."""
     edges = body.membrane.triangles[:, EDGES_OF_TRIANGLE].reshape(-1, 2)
     ends = np.concatenate([body.springs.ends, edges])
     return float(lengths(body.rest, ends).mean()) if len(ends) else np.inf

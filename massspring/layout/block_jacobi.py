@@ -1,4 +1,4 @@
-"""Which volumes make a cluster, and the inverse of S at rest in each: once, before a run (eq. 8.7)."""
+"""Clusters of volumes and the inverse of S at rest in each, computed once before a run (eq. 8.7)."""
 
 import numpy as np
 from scipy.sparse import csr_array, diags_array
@@ -8,18 +8,19 @@ from massspring.kernels.constraint.jacobian import rows_into
 from massspring.layout.sell_chunks import aligned
 
 SHIFT = 1e-4
-"""Added to the diagonal of 1: volumes that depend on each other leave the inverse bounded, a factor that single
-precision resolves. The smallest eigenvalues of independent ones are some hundredths."""
+"""Added to the diagonal of 1, so that the inverse stays bounded, and within single precision, if volumes depend on each
+other. The smallest eigenvalues for independent volumes are some hundredths."""
 
 
 def each_alone(volumes: int) -> Clusters:
-    """As if no volume knew of another: the diagonal of S as preconditioner."""
+    """Clusters without coupling: the diagonal of S as preconditioner."""
     count = -(-volumes // SIZE)
     return _clusters(np.arange(volumes), [np.eye(min(SIZE, volumes - b * SIZE)) for b in range(count)])
 
 
 def clusters_at_rest(rows: VolumeRows, rest: np.ndarray, inverse_mass: np.ndarray) -> Clusters:
-    """Clusters of what pulls strongest at each other at positions `rest` (n, 3), and the inverse of S in each."""
+    """Clusters of the volumes that are coupled most strongly at positions `rest` (n, 3) [m], and the inverse of S in
+    each."""
     unit = _unit_matrix(rows, rest, inverse_mass)
     order = clustered(unit)
     cut = [order[first : first + SIZE] for first in range(0, len(order), SIZE)]
@@ -28,8 +29,9 @@ def clusters_at_rest(rows: VolumeRows, rest: np.ndarray, inverse_mass: np.ndarra
 
 
 def clustered(unit: csr_array) -> np.ndarray:
-    """All volumes (m,), each 64 in turn a cluster: begun by the one that pulls least at those that are left, and grown
-    by the one that the cluster pulls most, by the squares of the scaled S_rs in `unit` (m, m)."""
+    """An order of all volumes, (m,), in which every 64 form a cluster. A cluster begins with the volume least coupled
+    to those left, and grows by the one most coupled to it; coupling is the square of the scaled S_rs in `unit` (m,
+    m)."""
     pulls = unit.power(2)
     start, other, pull = pulls.indptr, pulls.indices, pulls.data
     loose, order = pulls.sum(axis=1), np.empty(unit.shape[0], dtype=np.int64)  # pyright: ignore[reportOptionalSubscript]
@@ -48,7 +50,8 @@ def clustered(unit: csr_array) -> np.ndarray:
 
 
 def _unit_matrix(rows: VolumeRows, rest: np.ndarray, inverse_mass: np.ndarray) -> csr_array:
-    """S_rs/√(S_rr S_ss) [1] without contact, (m, m); a volume whose nodes are all held is left alone."""
+    """S_rs/√(S_rr S_ss) [1] without contact, (m, m); a volume whose nodes are all held is not coupled and has a
+    diagonal of 1."""
     rows_into(rest, inverse_mass, rows)
     m = len(rows.lam)
     at = 3 * rows.column[:, None].astype(np.int64) + np.arange(3)

@@ -1,4 +1,4 @@
-"""Builds the arrays of the faces of a cut that may touch, once, before a run."""
+"""Builds the arrays for faces of a cut that may touch, once before a run."""
 
 import numpy as np
 
@@ -9,7 +9,7 @@ from massspring.kernels.arrays.face_pairs import FacePairs
 
 
 def face_pairs(body: Body, pairs: np.ndarray) -> FacePairs:
-    """The arrays of `pairs` (p, 2), nodes behind a cut and their copies in front of it, in the numbers of `body`.
+    """The arrays for `pairs` (p, 2): nodes of `body` behind a cut and their copies in front of it.
 
     Raises MassSpringError for pairs that are not the two sides of a cut."""
     pairs, n = np.asarray(pairs, dtype=np.int64).reshape(-1, 2), body.node_count
@@ -49,7 +49,8 @@ def face_pairs(body: Body, pairs: np.ndarray) -> FacePairs:
 
 
 def _sides(body: Body, faces: np.ndarray, pairs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The mid-sides around each corner, of quadratic bodies alone; `faces` (t, 3): pairs of the parts of facets."""
+    """The mid-sides around each corner, for quadratic bodies only; `faces` (t, 3): pairs at the corners of the flat
+    parts of facets."""
     if not isinstance(body.kept, PointVolumes):
         return np.zeros(len(pairs) + 1, dtype=np.uint32), np.empty(0, dtype=np.uint32)
     is_corner = np.isin(pairs[:, 0], body.kept.cells[:, :4])

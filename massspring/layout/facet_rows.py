@@ -1,16 +1,16 @@
-"""Builds the arrays of contact inside quadratic facets (kernels.points.facets), once, before a run."""
+"""Builds the arrays for contact inside quadratic facets (kernels.points.facets), once before a run."""
 
 import numpy as np
 
 from massspring.kernels.points.arrays import FacetRows
 
 CORNER = np.array([[0, 1, 3], [1, 2, 4], [2, 0, 5]])
-"""Of each side of a facet its ends and its middle."""
+"""Both ends and the middle of each side of a facet."""
 RULE = ((0.091576213509771, 0.109951743655322), (0.445948490915965, 0.223381589678011))
 """Points (b, b, 1 − 2b) in three turns and their weights: exact to the fourth degree (Strang, Fix 1973; Dunavant 1985),
 as in the reference."""
 MARGIN = 1.5
-"""On the radius of a facet at rest: it may stretch."""
+"""Factor on the radius of a facet at rest, since it may stretch."""
 
 
 def facet_rule() -> tuple[np.ndarray, np.ndarray]:
@@ -26,7 +26,7 @@ def facet_rule() -> tuple[np.ndarray, np.ndarray]:
 
 
 def facet_rows(facets: np.ndarray, rest: np.ndarray, inverse_mass: np.ndarray) -> FacetRows:
-    """Of facets (f, 6) that are not held altogether."""
+    """The arrays for those of the facets (f, 6) that have a free node."""
     node = facets[(inverse_mass[facets] > 0.0).any(axis=1)]
     shape, weight = facet_rule()
     x = rest[node]

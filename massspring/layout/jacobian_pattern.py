@@ -1,4 +1,4 @@
-"""Builds the sparse rows of several volumes: who adds to which entry, once, before a run."""
+"""Builds the sparse rows of J for several volumes: which triangles add to which entry, once before a run."""
 
 import numpy as np
 from scipy.sparse import csr_array
@@ -14,7 +14,7 @@ DENSE_UP_TO = 64
 """Volumes up to which S is factored densely; beyond it conjugate gradients from the last multipliers are cheaper."""
 
 OF_EACH_VOLUME = ("volume", "lam", "right", "free_diagonal", "diagonal", "search", "image", "allowed")
-"""Arrays with one number for each volume, double in either precision."""
+"""Arrays with one number per volume, float64 in either precision."""
 
 
 def volume_rows(volumes: Volumes, nodes: int) -> VolumeRows:
@@ -52,13 +52,13 @@ def volume_rows(volumes: Volumes, nodes: int) -> VolumeRows:
 
 
 def _rings(sums: csr_array, triangles: np.ndarray, place: np.ndarray) -> dict[str, np.ndarray]:
-    """The quadrangles that make each entry of J, entry after entry, and where the entry goes: by row, and by node."""
+    """The quadrangles whose areas sum to each entry of J, and the indices of the entry, by row and by node."""
     chains, edges = edge_chains(sums, triangles)
     chains.sort_indices()
     summed, twin = _twins(chains)
     ring, corner, share = quadrangles(chains[summed], edges)
     sizes = np.bincount(ring, minlength=len(summed))
-    # Alike ones one after the other: the processor then knows what comes.
+    # Rings of equal size follow each other, so that the processor predicts the loop lengths.
     order = np.lexsort((sizes, twin != summed))
     rank = np.empty(len(order), dtype=np.int64)
     rank[order] = np.arange(len(order))
@@ -74,17 +74,17 @@ def _rings(sums: csr_array, triangles: np.ndarray, place: np.ndarray) -> dict[st
 def _twins(chains: csr_array) -> tuple[np.ndarray, np.ndarray]:
     """Entries to sum, and the entry that is the negative of each (itself where none is), (c,) and (c,).
 
-    Where just two volumes meet in a node they share its ring, passed in opposite senses; and the volumes of two nodes
-    inside a body push each other's node with the ring of tetrahedra around their edge.
+    If exactly two volumes meet at a node, they share its ring with opposite orientation. For two nodes inside a body
+    the entries of each volume at the other node use the same ring, that around their edge.
     """
-    # Opposite chains have the same sum but for its sign, whatever is added up, as it is in the same order.
+    # Any sum over opposite chains differs only in sign, to the last bit, since terms have the same order.
     names = np.random.default_rng(0).normal(size=chains.shape[1])  # pyright: ignore[reportOptionalSubscript]
     sums = np.asarray(chains @ names)
     alike = np.lexsort((sums, np.abs(sums)))
     first, second = np.sort([alike[:-1], alike[1:]], axis=0)
     both = csr_array(chains[first] + chains[second])
     both.eliminate_zeros()
-    # Of those alike the negative ones come first: one pair at most of each kind.
+    # Among equal absolute values the negative ones come first, so each gives at most one pair.
     opposite = (np.diff(both.indptr) == 0) & (np.diff(sums[alike]) > 0.0)
     twin = np.arange(len(sums))
     twin[first[opposite]] = second[opposite]

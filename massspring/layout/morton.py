@@ -1,4 +1,4 @@
-"""An order in which neighbours in space are neighbours in memory."""
+"""A node order in which neighbours in space are near in memory."""
 
 import numpy as np
 
@@ -6,9 +6,9 @@ CURVE_BITS = 20  # per axis: a millionth of the body, so that no two nodes share
 
 
 def along_curve(x: np.ndarray) -> np.ndarray:
-    """Place of each point on a curve through all of them that seldom leaves a neighbourhood: Morton's order, (n,).
+    """Position of each point along a space-filling curve, Morton's order, (n,).
 
-    The bits of the three coordinates x [m], (n, 3), take turns (Morton 1966).
+    It interleaves the bits of the three coordinates x [m], (n, 3) (Morton 1966).
     """
     cells = 1 << CURVE_BITS
     size = max(float(np.ptp(x, axis=0).max()), np.finfo(float).tiny)

@@ -1,4 +1,4 @@
-"""Builds the arrays of volumes over points (kernels.points), once, before a run."""
+"""Builds the arrays for volumes over points (kernels.points), once before a run."""
 
 import numpy as np
 from scipy.sparse import csr_array, diags_array
@@ -10,7 +10,7 @@ from massspring.layout.facet_rows import facet_rows
 from massspring.layout.sell_chunks import aligned
 
 SHIFT = 1e-6
-"""Added to the diagonal of 1 of S: volumes that depend on each other leave its inverse bounded."""
+"""Added to the diagonal of the scaled S, so that its inverse stays bounded if volumes depend on each other."""
 REAL = np.dtype(np.float64)
 
 
@@ -61,7 +61,8 @@ def _compliance(rows: csr_array, inverse_mass: np.ndarray) -> csr_array:
 
 
 def _in_blocks(table: np.ndarray) -> np.ndarray:
-    """Of elements (k, c) the numbers of each column side by side, (c b, BLOCK); empty places repeat the first."""
+    """A table of elements (k, c) in blocks: each row has one column of BLOCK elements, (c b, BLOCK); unused places
+    repeat the first element."""
     count, width = table.shape
     blocks = -(-count // BLOCK)
     filled = np.full((blocks * BLOCK, width), table[:1], dtype=table.dtype)
@@ -72,8 +73,8 @@ def _in_blocks(table: np.ndarray) -> np.ndarray:
 
 
 def _entries(table: np.ndarray, count: int, components: int) -> tuple[np.ndarray, np.ndarray]:
-    """Of each of `count` owners named in `table` (k, c) where its places begin, (count + 1,), and those places in a
-    blocked table with `components` rows for each column, (k c,)."""
+    """For each of `count` owners named in `table` (k, c): its first entry, (count + 1,), and the flat indices of its
+    entries in a blocked table with `components` rows per column, (k c,)."""
     elements, width = table.shape
     element, column = np.repeat(np.arange(elements), width), np.tile(np.arange(width), elements)
     place = ((element // BLOCK * width + column) * components) * BLOCK + element % BLOCK
@@ -83,9 +84,9 @@ def _entries(table: np.ndarray, count: int, components: int) -> tuple[np.ndarray
 
 
 def inverse_at_rest(schur: csr_array | np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Of S (m, m) its diagonal, 1/√S_rr (m,), and the inverse of S scaled to a diagonal of 1, (m, m) float32.
+    """(S_rr (m,), 1/√S_rr (m,), inverse of S scaled to a diagonal of 1, (m, m) float32) of a matrix S (m, m).
 
-    A volume whose nodes are all held has neither.
+    For a volume whose nodes are all held S_rr and 1/√S_rr are 0.
     """
     whole = schur if isinstance(schur, np.ndarray) else schur.toarray()
     diagonal = np.diag(whole).copy()

@@ -1,4 +1,4 @@
-"""Thin probes and a closed surface: what the stage of a run needs, and where a tip is (docs/theory.md, section 11)."""
+"""Builds the arrays of the stage for thin probes, and measures how deep a tip is (docs/theory.md, section 11)."""
 
 import numpy as np
 
@@ -11,18 +11,20 @@ from massspring.layout.morton import along_curve
 from massspring.world.obstacles import Probe
 
 SKIN = 0.01
-"""Of the mean edge: how far a surface stays off a tip that has no thickness, so that it always lies on a side."""
+"""Distance that a surface keeps from a tip without thickness, over the mean edge, so that the tip is always on one
+side."""
 MOST_ROWS = 24
-"""Point contacts of a step. A thin tip in a dimple touches one to eight triangles; what finds no row is carried."""
+"""Most point contacts of a step. A thin tip in a dimple touches one to eight triangles; triangles without a row are
+carried."""
 
 
 def kept_radius(probe: Probe, body: Body) -> float:
-    """How far the surface stays from the tip [m]: the probe's radius, or the skin of one without thickness."""
+    """Distance that the surface keeps from the tip [m]: the radius of the probe, at least SKIN mean edges."""
     return max(probe.radius, SKIN * mean_edge(body))
 
 
 def new_probing(body: Body, surface: np.ndarray, probes: tuple[Probe, ...], diagnostics: FrameDiagnostics) -> Probing:
-    """Everything awake, nothing in contact, for probes on the triangles `surface` (f, 3)."""
+    """The initial arrays for probes on the triangles `surface` (f, 3): no pair sleeps, nothing is in contact."""
     count, triangles, nodes = len(probes), len(surface), body.node_count
     number = np.argsort(along_curve(body.rest[surface].mean(axis=1)))
     many, kept = MOST_ROWS, body.kept.count
@@ -63,13 +65,14 @@ def new_probing(body: Body, surface: np.ndarray, probes: tuple[Probe, ...], diag
 
 
 def fresh(probing: Probing, diagnostics: FrameDiagnostics) -> Probing:
-    """What a frame may change without changing the state it starts from."""
+    """A copy that a frame may change without a change to the state from which it starts."""
     kept = {name: getattr(probing, name).copy() for name in ("travel", "wake", "passed", "counts")}
     return probing._replace(diagnostics=diagnostics, **kept)
 
 
 def tip_depth(probe: Probe, x: np.ndarray, triangles: np.ndarray, t: float) -> float:
-    """How deep the surface lies in a probe at time `t` [m]: its radius less the distance of the tip, behind it more.
+    """How deep the surface lies in a probe at time `t` [m]: its radius minus the distance of the tip, or plus the
+    distance if the tip is inside the surface.
 
     `x` (n, 3) [m]. Negative while they are apart.
     """

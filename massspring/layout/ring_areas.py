@@ -1,15 +1,16 @@
-"""Closed chains of edges as quadrangles: the area of a ring in half as many products as it has nodes."""
+"""Splits closed chains of edges into quadrangles, so that the area of a ring takes half as many products as it has
+nodes."""
 
 import numpy as np
 from scipy.sparse import coo_array, csr_array
 
 
 def edge_chains(shares: csr_array, triangles: np.ndarray) -> tuple[csr_array, np.ndarray]:
-    """The boundaries of sums of triangles `shares` (c, f): how often each edge is passed from low to high, (c, E).
+    """The boundaries of sums of triangles `shares` (c, f): how often each edge is passed from its lower to its higher
+    node, (c, E), and the edges (E, 2).
 
-    With the edges (E, 2). What two triangles share is passed both ways and drops out: around a node of a closed volume
-    a ring is left.
-    """
+    An edge that two triangles share is passed both ways and cancels, so the chain of a node of a closed volume is a
+    ring."""
     walked = triangles.astype(np.int64)[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
     edges, edge = np.unique(np.sort(walked, axis=1), axis=0, return_inverse=True)
     sense = np.where(walked[:, 0] < walked[:, 1], 1.0, -1.0)
@@ -23,8 +24,8 @@ def edge_chains(shares: csr_array, triangles: np.ndarray) -> tuple[csr_array, np
 def quadrangles(chains: csr_array, edges: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Each closed chain (eq. 8.6) as (row of each quadrangle, ascending, its corners (q, 4), its share), (q,) each.
 
-    All are fans about the lowest node of the chain, o: two edges in a row, u → v → w, are (o, u, v, w), a single one
-    (o, u, v, o). Edges that meet o add nothing.
+    Quadrangles are fans about the lowest node o of the chain: two successive edges u → v → w give (o, u, v, w), a
+    single edge (o, u, v, o). Edges at o contribute nothing.
     """
     walked = chains.tocoo()
     forward = walked.data > 0
@@ -42,7 +43,8 @@ def quadrangles(chains: csr_array, edges: np.ndarray) -> tuple[np.ndarray, np.nd
 
 
 def _followers(row: np.ndarray, tail: np.ndarray, head: np.ndarray, share: np.ndarray) -> np.ndarray:
-    """The edge that goes on where each ends, in the same row and as often; -1 for none. No edge follows two."""
+    """For each edge the one that continues it, in the same row and with the same share; -1 for none. No edge continues
+    two."""
     nodes = int(max(tail.max(initial=0), head.max(initial=0))) + 1
     leaving, arriving = row * nodes + tail, row * nodes + head
     by_tail = np.argsort(leaving, kind="stable")
@@ -61,7 +63,7 @@ def _rank(key: np.ndarray) -> np.ndarray:
 
 
 def _in_twos(after: np.ndarray, row: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """All edges, an edge and the one that follows it at a time (-1 where none is left), each once."""
+    """All edges, each once, in pairs of an edge and its successor (-1 if none is left)."""
     seen, firsts, seconds = np.zeros(len(after), dtype=bool), [], []
     begins = np.ones(len(after), dtype=bool)
     begins[after[after >= 0]] = False
@@ -76,7 +78,7 @@ def _in_twos(after: np.ndarray, row: np.ndarray) -> tuple[np.ndarray, np.ndarray
             now = after[second[second >= 0]]
             now = now[now >= 0]
             now = now[~seen[now]]
-        # What is left goes round without an end: one round of each row at a time.
+        # The remaining edges form closed loops: one loop of each row at a time.
         rest = np.flatnonzero(~seen)
         now = rest[np.unique(row[rest], return_index=True)[1]]
     none = np.zeros(0, dtype=np.int64)

@@ -1,4 +1,5 @@
-"""The neighbours of all nodes as `kernels.fused` wants them: rings first, 64 nodes with lists of like length."""
+"""The neighbours of all nodes in the layout of `kernels.fused`: rings first, slices of 64 nodes with lists of similar
+length."""
 
 from dataclasses import dataclass
 
@@ -10,16 +11,16 @@ from massspring.kernels.fused.chunk import LANES
 from massspring.layout.morton import along_curve
 
 LONGEST, PIECE = 24, 10
-"""Springs besides its ring up to which a node has a lane of its own; beyond it is cut into pieces of so many. A virtual
-node joined to forty others would make 63 lanes wait for it."""
+"""LONGEST: springs outside its ring up to which a node takes one lane. A node with more is split into pieces of PIECE
+springs: a virtual node joined to forty others would make 63 lanes wait for it."""
 CACHE_LINE = 64  # bytes
 WINDOW = 2048
-"""Nodes, along a curve that fills space, among which lists of like length are put together. Wider windows have slices
-whose neighbours are all over the body and fall out of the nearest cache, narrower ones have more empty places."""
+"""Nodes along a space-filling curve among which lists are sorted by length. In wider windows the neighbours of a slice
+are spread over the body and miss the first-level cache; narrower windows have more empty places."""
 
 
 def aligned(shape: tuple[int, ...], real: np.dtype) -> np.ndarray:
-    """Zeros that begin where a line of the cache does: a vector register's worth then never lies in two (20 %)."""
+    """Zeros aligned to a cache line, so that no vector load crosses two lines (saves 20 %)."""
     size = int(np.prod(shape)) * real.itemsize
     room = np.zeros(size + CACHE_LINE, dtype=np.uint8)
     begin = -room.ctypes.data % CACHE_LINE
@@ -28,7 +29,8 @@ def aligned(shape: tuple[int, ...], real: np.dtype) -> np.ndarray:
 
 @dataclass(frozen=True)
 class _Lists:
-    """Lists of neighbours, flat: the list and the place in it of every entry, its node, and its spring (-1: none)."""
+    """Lists of neighbours, flat: for every entry its list, its place in the list, its node, and its spring (-1:
+    none)."""
 
     of: np.ndarray
     at: np.ndarray
@@ -39,7 +41,7 @@ class _Lists:
 def rings(triangles: np.ndarray, nodes: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """The closed walks round the nodes of a closed surface: (centre (c,), and of its entries: walk, place, neighbour).
 
-    Walks turn like the triangles, from a neighbour over a triangle to the next. A node where two sheets touch has two.
+    Walks have the orientation of the triangles. A node at which two sheets touch has two walks.
     """
     corners = np.concatenate([np.roll(triangles, -turn, axis=1) for turn in range(3)]).astype(np.int64)
     key = corners[:, 0] * nodes + corners[:, 1]
@@ -86,21 +88,22 @@ def _lists_of(springs: Springs, triangles: np.ndarray, nodes: int) -> tuple[np.n
 
 @dataclass(frozen=True)
 class _Slots:
-    """Lanes of slices, and what each works on."""
+    """Lanes of slices, with the node, ring and other springs of each."""
 
     node: np.ndarray
-    """Of each lane, (S, LANES); empty lanes repeat a node of their slice."""
+    """Node of each lane, (S, LANES); empty lanes repeat a node of their slice."""
     lanes: np.ndarray
-    """In use, (S,)."""
+    """Lanes in use, (S,)."""
     pieces: int
-    """Slices of pieces, which come first."""
+    """Number of slices of pieces, which come first."""
     ring: _Lists
-    """By lane: `of` is slice × LANES + lane."""
+    """Rings by lane: `of` is slice × LANES + lane."""
     rest: _Lists
 
 
 def _slots(centre: np.ndarray, ring: _Lists, rest: _Lists, place_of: np.ndarray) -> _Slots:
-    """Gives every node a lane, or several where it has too many neighbours or several rings; by places on a curve."""
+    """Assigns a lane to every node, or several if it has too many neighbours or several rings, in the order of places
+    on a curve."""
     nodes = len(place_of)
     rings_of, springs_of = np.bincount(centre, minlength=nodes), np.bincount(rest.of, minlength=nodes)
     split = (rings_of > 1) | (springs_of > LONGEST)
@@ -138,16 +141,17 @@ def _rows(lists: _Lists, slices: int) -> np.ndarray:
 
 
 def _by_node(node: np.ndarray, piece: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The nodes, ascending, the pieces node by node, and where those of each node begin."""
+    """The nodes, ascending; the pieces node by node; the first piece of each node."""
     order = np.argsort(node, kind="stable")
     owners, start = np.unique(node[order], return_index=True)
     return owners, piece[order], np.r_[start, len(node)].astype(np.int64)
 
 
 def places_in_slices(springs: Springs, triangles: np.ndarray, rest: np.ndarray) -> np.ndarray:
-    """Place of each node when those of a slice follow each other, and nodes in pieces come last, (n,).
+    """New number of each node, (n,), such that the nodes of a slice are consecutive and nodes in pieces come last.
 
-    `triangles` (f, 3): the kept surface; `rest` (n, 3) [m]. Nodes so numbered are found in their places again.
+    `triangles` (f, 3): the kept surface; `rest` (n, 3) [m]. Applied to a body with these numbers, it leaves them
+    unchanged.
     """
     slots = _slots(*_lists_of(springs, triangles, len(rest)), along_curve(rest))
     used = np.arange(LANES) < slots.lanes[:, None]
@@ -162,7 +166,7 @@ def _springs_by_lane(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Neighbours, their rest lengths [m] and stiffnesses [N/m], (r, LANES) each: rings first, `ring_rows` (S,) of them.
 
-    What fills a short ring is its first neighbour again, and a short list the node itself.
+    A short ring is filled with its first neighbour, a short list with the node itself.
     """
     begins = slots.node.copy()
     first = slots.ring.at == 0
@@ -182,7 +186,7 @@ def _springs_by_lane(
 def slices_of(springs: Springs, triangles: np.ndarray, inverse_mass: np.ndarray, rest: np.ndarray) -> Slices:
     """The layout for `springs` and the kept surface `triangles` (f, 3) on nodes of `inverse_mass` (n,) [1/kg].
 
-    Nodes that are near each other at rest, (n, 3) [m], share a slice, as far as their lists are of like length.
+    Nodes that are near each other at rest, (n, 3) [m], share a slice as far as their lists have similar lengths.
     """
     real = rest.dtype
     slots = _slots(*_lists_of(springs, triangles, len(rest)), along_curve(rest))

@@ -1,4 +1,4 @@
-"""A body in motion, as every method is given it."""
+"""The state of a body in motion, which every method advances."""
 
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -24,25 +24,25 @@ class State:
     contacts: Contacts
     work: Workspace
     lam: np.ndarray
-    """Interior gauge pressure of each kept volume in the last step, beyond what it is at rest [Pa], (m,); 0 for
-    methods that keep none."""
+    """Interior gauge pressure of each kept volume in the last step, minus its value at rest [Pa], (m,); 0 for methods
+    that keep no volume."""
     rows: VolumeRows | PointRows | None = None
-    """None where one closed surface is kept: a division needs no rows."""
+    """None if one closed surface is kept, which needs no rows."""
     diagnostics: FrameDiagnostics = field(default_factory=lambda: new_diagnostics(0, 0))
-    """What the last frame measured of itself."""
+    """Diagnostics of the last frame."""
     memory: Any = None
-    """Arrays that only the method knows, made by its `start`."""
+    """Data that only the method uses, created by its `start`."""
     probing: Probing | None = None
-    """Of thin probes; None where there are none: the frame is then compiled without their stage."""
+    """Arrays of thin probes, or None; with None the frame is compiled without their stage."""
     pairs: FacePairs | None = None
-    """Faces of a cut that may touch; None where there are none: the frame is then compiled without them."""
+    """Faces of a cut that may touch, or None; with None the frame is compiled without them."""
     permutation: np.ndarray | None = None
-    """Where each node is in `model` and `nodes`, (n,); None where they have the numbers of the body."""
+    """Index of each node of the body in `model` and `nodes`, (n,); None if the numbers are the same."""
 
     team: ThreadTeam | None = None
     """Threads that share the longest loops of a frame; None for one thread."""
     origin: np.ndarray | None = None
-    """What `nodes.x` and `model.held_rest` are relative to [m], (3,); None where they are as given."""
+    """Origin of `nodes.x` and `model.held_rest` [m], (3,); None for the origin of the body."""
 
     @property
     def x(self) -> np.ndarray:
@@ -56,7 +56,7 @@ class State:
         return self.nodes.v if self.permutation is None else self.nodes.v[self.permutation]
 
     def frame(self, boundary: BoundaryConditions) -> Frame:
-        """What a frame loop is given."""
+        """The arguments of a frame loop."""
         return Frame(
             self.model, self.nodes, self.contacts, self.work, boundary, self.diagnostics, self.probing, self.team
         )
@@ -69,9 +69,9 @@ class State:
         return replace(self, nodes=nodes)
 
     def relative_to(self, origin: np.ndarray) -> "State":
-        """The same body in the same place, its arrays relative to `origin` (3,) [m]; they were as given.
+        """The same body in the same place, with arrays relative to `origin` (3,) [m]; `self` must have no origin.
 
-        The obstacles of a frame have to be so too (`Setup.boundary`).
+        The obstacles of a frame must have the same origin (`Setup.boundary`).
         """
         nodes = self.nodes._replace(x=self.nodes.x - origin)
         model = self.model._replace(held_rest=self.model.held_rest - origin)

@@ -24,7 +24,7 @@ def cores() -> int:
 
 
 def shared(state: State, threads: int) -> State:
-    """`state` to be advanced by so many threads, two or more; each has scratch of its own."""
+    """`state` prepared for two or more `threads`, each with separate scratch memory."""
     team = team_of(threads, state.model.slices.start, len(state.nodes.x), BLOCK)
     work = state.work._replace(tile=aligned((threads, TILE), state.work.tile.dtype))
     return replace(state, work=work, team=team)
@@ -42,7 +42,7 @@ def team_at_work(frame: Frame, direction: np.ndarray) -> Iterator[None]:
         return
     others = range(1, len(team.nodes) - 1)
     if not team.signal[READY]:
-        # A thread that had to compile, or could not, would keep the frame waiting.
+        # The first call compiles here: a thread that has to compile, or fails to, would block the frame.
         shutdown(team)
         worker(frame, team, direction, 1)
         team.signal[READY] = 1
@@ -58,5 +58,5 @@ def team_at_work(frame: Frame, direction: np.ndarray) -> Iterator[None]:
 
 @cache
 def _pool(process: int, others: int) -> ThreadPoolExecutor:
-    """Threads live as long as the process; one that was forked has none of its parent's."""
+    """Threads live as long as the process. A forked process has none of its parent's, hence the process id as key."""
     return ThreadPoolExecutor(others, thread_name_prefix="massspring")

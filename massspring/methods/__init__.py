@@ -44,7 +44,7 @@ METHODS: tuple[type[Method], ...] = (
 )
 
 LITERATURE: tuple[type[Method], ...] = (AngularSprings, ChainMail, LinearModes, ElasticResponse)
-"""What the literature puts in the place of METHODS; it does not promise what the contract test measures of those."""
+"""Alternatives from the literature; they do not make the claims that the contract test measures for METHODS."""
 
 VARIANTS: tuple[Method, ...] = (
     Element(hard=True),
@@ -53,4 +53,5 @@ VARIANTS: tuple[Method, ...] = (
     ExplicitElements(law="corotated"),
     ImplicitElements(law="corotated"),
 )
-"""Settings with which a method solves other equations than by default, or may; the contract test covers them too."""
+"""Settings with which a method solves, or may solve, other equations than by default; the contract test covers them
+too."""

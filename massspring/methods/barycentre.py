@@ -4,8 +4,8 @@ Bourguignon and Cani, Controlling anisotropy in mass-spring systems, Eurographic
 2000: forces along r_j, from the barycentre to node j, in proportion to Σ|r_j| − Σ|r_j|_0 (docs/theory.md, eq. 10.12).
 
 Two changes. The factor is 9 K V_t0/(Σ|r_j|_0)², so that a cell that grows evenly resists with the bulk modulus K
-whatever its size. The mean of the four directions is taken off, which makes the force the derivative of an energy;
-as published, a cell that is not regular pushes itself about.
+whatever its size. The mean of the four directions is subtracted, which makes the force the derivative of an energy; as
+published, an irregular cell exerts a net force on itself.
 
 Limits: a sum of distances is not a volume: a cell can be flattened at no cost while its edges grow. K shortens the
 step.
@@ -33,8 +33,8 @@ class Barycentre(Method):
     """Pushes the nodes of each tetrahedron from its barycentre when they have come closer."""
 
     bulk_modulus: float = 100_000.0
-    """K [Pa]; that of the penalty, so that the two can be compared. It takes 75 % off the step of a ball of 1,500
-    tetrahedra."""
+    """K [Pa]; the default of `Penalty`, so that the two can be compared. It shortens the step of a ball of 1,500
+    tetrahedra by 75 %."""
 
     name: ClassVar[str] = "barycentre"
     order: ClassVar[int] = 1
@@ -45,7 +45,7 @@ class Barycentre(Method):
         check_modulus(self.name, "bulk_modulus", self.bulk_modulus)
 
     def added_stiffness(self, body: Body) -> csr_array:
-        """9 K V_t0/(Σ|r|_0)² of every cell."""
+        """B [√(N/m)], (3n, k), with stiffness 9 K V_t0/(Σ|r|_0)² for every cell."""
         corners = body.rest[body.tetrahedra]
         spokes = corners - corners.mean(axis=1, keepdims=True)
         length = np.linalg.norm(spokes, axis=2, keepdims=True)
@@ -54,7 +54,7 @@ class Barycentre(Method):
         return cell_stiffness(body, units - units.mean(axis=1, keepdims=True), weight)
 
     def start(self, body: Body, attachments: tuple[Attachment, ...] = (), v: np.ndarray | None = None) -> State:
-        """With the cells at rest."""
+        """The body at rest, or with velocities `v` (n, 3) [m/s], with its cells at rest."""
         return start(body, attachments, v, cells_of(body))
 
     def advance(self, state: State, boundary: BoundaryConditions) -> State:

@@ -1,4 +1,4 @@
-"""What a method supports, in one table: refusals, the rows of the tests and docs/methods.md are derived from it."""
+"""The table of what a method supports. Refusals, the rows of the tests and docs/methods.md are derived from it."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -9,15 +9,15 @@ from massspring.body.body import SAME_VOLUME, Body
 from massspring.body.points import PointVolumes
 
 Kept = Literal["none", "whole", "several", "tetrahedra", "points", "elements"]
-"""Volumes that a method keeps: none; the one inside the body's surface; one or several of any kind; the tissue,
-tetrahedron by tetrahedron; those over the points of quadratic elements alone; those of the elements of an elastic
-solid, linear or quadratic, whose shear is in springs without length."""
+"""Volumes that a method keeps: none; the one inside the body's surface; one or several of any kind; each tetrahedron of
+the tissue; only volumes over points of quadratic elements; those of linear or quadratic elements of an elastic solid
+whose springs without length carry the shear."""
 
 Correction = Literal["limited", "full", "penalty", "unbounded"]
-"""How a step corrects a wrong volume. "limited": each volume moves a node by `correction_limit` at most (eq. 8.5),
-the rest is left to later steps; "full": the whole error is corrected in the step; "penalty": by a force whose size only
-the length of a stable step bounds; "unbounded": by a force that grows without bound as the volume goes to 0, so that a
-crushed body bursts and the run diverges."""
+"""How a step corrects a volume error. "limited": the correction of each volume moves a node by at most
+`correction_limit` (eq. 8.5), and later steps correct the rest. "full": the step corrects the whole error. "penalty": by
+a force that only the stable step length bounds. "unbounded": by a force that grows without bound as the volume goes to
+0, so that a crushed body bursts and the run diverges."""
 
 
 @dataclass(frozen=True)
@@ -35,14 +35,15 @@ Support = Literal[True] | No
 
 @dataclass(frozen=True)
 class Capabilities:
-    """Abilities of a method with given settings. What it promises of its results (order, volume) are its claims."""
+    """Capabilities of a method with given settings. Promises about its results (order, volume) are claims, not
+    capabilities."""
 
     keeps: Kept
     correction: Correction | None = None
-    """None where no volume is corrected. Otherwise steps in which a volume has no gradient are counted, but for hard
+    """None if no volume is corrected. Otherwise steps in which a volume has no gradient are counted, except for hard
     elements, whose compliance leaves no residual there."""
     conditionally_stable: bool = True
-    """Whether steps beyond the stability limit diverge; where not, accuracy alone limits the step."""
+    """Whether steps beyond the stability limit diverge; if not, only accuracy limits the step."""
     triangle_springs: Support = True
     """Bodies with triangle springs (membranes)."""
     prestress: Support = No("it does not start with the pressures that balance these springs at rest")
@@ -52,7 +53,7 @@ class Capabilities:
     facet_contact: Support = No("obstacles touch its nodes")
     """Bodies that obstacles touch at points inside facets."""
     thin_probes: Support = No("its steps have no stage for them")
-    """Thin probes, met in continuous time."""
+    """Thin probes, with contact in continuous time."""
     face_contact: Support = No("its steps do not keep the faces of a cut apart")
     """Faces of a cut that touch each other."""
     threads: Support = No("its steps are not divided among threads")

@@ -1,13 +1,13 @@
-"""Every tetrahedron keeps its own volume: by a penalty, or hard.
+"""Keeps the volume of every tetrahedron, by a penalty or as a hard constraint.
 
 Penalty: Teschner, Heidelberger, Müller, Gross, A versatile and robust model for geometrically complex deformable
 solids, Computer Graphics International 2004; energy ½ K V_t0 ((V_t − V_t0)/V_t0)² (docs/theory.md, eq. 10.11). Hard:
 one multiplier per tetrahedron, all solved for together at the end of the step with the compliance 1/K (eq. 10.13), the
 constraint of HCJ05 with as many volumes as there are cells.
 
-Limits: a mesh has about five tetrahedra for each node and three coordinates: with all volumes kept it cannot deform as
-the tissue would (locking), the more the larger K. A force pressed from it is too large by a factor, not by per cent.
-The penalty shortens the step, the hard one does not.
+Limits: a mesh has about five tetrahedra for each node and three coordinates: with all volumes kept it is too stiff
+(locking), the more so the larger K. Contact forces are too large by a factor, not by a few per cent. The penalty
+shortens the step, the hard constraint does not.
 """
 
 from dataclasses import dataclass, replace
@@ -63,10 +63,10 @@ class Element(Method):
     """Keeps the volume of every tetrahedron, softly or hard."""
 
     bulk_modulus: float = 100_000.0
-    """K [Pa]; that of the penalty, so that the two can be compared. Pushing, it takes 80 % off the step of a ball of
-    1,500 tetrahedra; hard, nothing."""
+    """K [Pa]; the default of `Penalty`, so that the two can be compared. As a penalty it shortens the step of a ball of
+    1,500 tetrahedra by 80 %; as a hard constraint it does not."""
     hard: bool = False
-    """Whether the pressures are solved for at the end of the step."""
+    """Whether volumes are a hard constraint, with pressures solved for at the end of the step."""
     tolerance: float = 1e-4
     """Volume error of a tetrahedron that the hard solve may leave, over its volume [1]."""
     most_iterations: int = 200
@@ -84,7 +84,7 @@ class Element(Method):
         check_modulus(self.name, "bulk_modulus", self.bulk_modulus)
 
     def added_stiffness(self, body: Body) -> csr_array | None:
-        """K/V_t0 dV_t/dx dV_t/dxᵀ of every cell; nothing where it is hard."""
+        """B [√(N/m)], (3n, k), with B Bᵀ = Σ_t K/V_t0 dV_t/dx dV_t/dxᵀ; None if `hard`."""
         if self.hard:
             return None
         cells = cells_of(body)
@@ -93,7 +93,7 @@ class Element(Method):
         return cell_stiffness(body, slopes, self.bulk_modulus / cells.rest_volume)
 
     def start(self, body: Body, attachments: tuple[Attachment, ...] = (), v: np.ndarray | None = None) -> State:
-        """With the cells at rest."""
+        """The body at rest, or with velocities `v` (n, 3) [m/s], with its cells at rest."""
         return start(body, attachments, v, cells_of(body))
 
     def advance(self, state: State, boundary: BoundaryConditions) -> State:

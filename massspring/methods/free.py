@@ -1,4 +1,4 @@
-"""Springs only: nothing keeps the volume. What the paper compares itself with."""
+"""Springs only, without volume constraint: the baseline of the paper."""
 
 from dataclasses import dataclass
 from typing import ClassVar

@@ -6,10 +6,10 @@ its quadratic model bounds the energy of the springs from above, so that passes
 
     A δ = M dt v + dt² (f(p) + m g) − (1 + c dt) M (p − x) + dt² Jᵀ lam + Cᵀ γ,   p ← p + δ
 
-descend whatever the step is. Volumes, linearised at p, cost a back-solve a step, Y = A⁻¹ Jᵀ; contact is eliminated
-with the columns of A⁻¹ at touched nodes, so that W̃ = A⁻¹ − A⁻¹ Cᵀ (C A⁻¹ Cᵀ)⁻¹ C A⁻¹ stands where W̃ stands in HCJ05.
+descend for any step. Each volume, linearised at p, takes one back-solve per step, Y = A⁻¹ Jᵀ; contact is eliminated
+with the columns of A⁻¹ at touched nodes, so that W̃ = A⁻¹ − A⁻¹ Cᵀ (C A⁻¹ Cᵀ)⁻¹ C A⁻¹ replaces the W̃ of HCJ05.
 
-Limits: no step is unstable, but long ones lose energy, and few passes slow down turning; Python once per pass.
+Limits: no step is unstable, but long ones lose energy, and few passes slow down rotation. Python runs once per pass.
 """
 
 from dataclasses import dataclass, replace

@@ -8,7 +8,7 @@ The constraint is linearised at the old positions and must hold at the end of th
 Several volumes have sparse rows J_r = dV_r/dx in place of Gᵀ, and S lam = rhs, S = J W̃ Jᵀ, in place of the division.
 
 Limits: V after a step is V0 + ½ Δxᵀ H Δx + V[Δx], second order in the last step only, so the error does not accumulate;
-G = 0 (a body collapsed to a line) leaves nothing to push on, the step is counted and lam = 0.
+G = 0 (a body collapsed to a line) has no gradient: the step is counted as singular and lam = 0.
 """
 
 import math
@@ -88,8 +88,8 @@ def implicit_volume_frame(frame, lam, pairs):
 
 @njit_inlined
 def limited_multiplier(model, nodes, contacts, error, dt, flow, mobility):
-    """lam [Pa] of the sums over all nodes (eq. 3.3), G·W̃·G, and whether only a part of the error is made up for
-    (eq. 8.5)."""
+    """lam [Pa] from the sums over all nodes (eq. 3.3), G·W̃·G, and whether only part of the error is corrected (eq.
+    8.5)."""
     weights, longest = model.inverse_mass, model.correction_limit
     lam, left = multiplier_of_sums(nodes, contacts, weights, error, dt, flow, mobility)
     if not left > 0.0 or surely_short(error, left, model.largest_inverse_mass, longest):
@@ -104,7 +104,7 @@ def limited_multiplier(model, nodes, contacts, error, dt, flow, mobility):
 def set_right_side(model, rows, nodes, contacts, target, dt, tolerance, pairs=None):
     """rhs_r = (V0_r − V_r)/dt² − (J u)_r/dt [m³/s²] with capped errors (eq. 8.3, 8.5), u = ṽ + dt W̃ Jᵀ lam.
 
-    Returns whether a volume was capped, and whether a wrong one had nothing to push on.
+    Returns whether an error was capped, and whether a volume with an error had no gradient.
     """
     pushed_velocity_into(nodes, contacts, model.inverse_mass, rows.push, dt, rows.node_vector)
     part_faces(pairs, contacts, model.inverse_mass, rows.node_vector, dt, True)
@@ -128,7 +128,7 @@ def set_right_side(model, rows, nodes, contacts, target, dt, tolerance, pairs=No
 
 @compiled
 def solve_multipliers(model, rows, contacts, diagnostics, accuracy, pairs=None):
-    """lam += S⁻¹ rhs for the contacts of the moment (eq. 8.3, 8.4); then Jᵀ lam [N] into `rows.push`."""
+    """lam += S⁻¹ rhs with the current contacts (eq. 8.3, 8.4); then Jᵀ lam [N] into `rows.push`."""
     if rows.matrix.shape[0] > 0:
         dense_into(rows, contacts, model.inverse_mass, rows.matrix)
         less_of_pairs_in(rows.matrix, pairs, rows, contacts, model.inverse_mass)
@@ -146,7 +146,8 @@ def solve_multipliers(model, rows, contacts, diagnostics, accuracy, pairs=None):
 
 @njit_lean
 def implicit_volumes_frame(frame, rows, accuracy, pairs):
-    """One frame of HCJ05 with several volumes (eq. 3.1–3.8, 8.2–8.5); `rows.lam` [Pa] comes in and goes out.
+    """One frame of HCJ05 with several volumes (eq. 3.1–3.8, 8.2–8.5); `rows.lam` [Pa] holds the multipliers on entry
+    and exit.
 
     `pairs`: faces of a cut that may touch, or None.
     """
@@ -183,11 +184,12 @@ class ImplicitVolume(Method):
     """Keeps each volume with one multiplier (HCJ05): one volume by a division, more by a small solve per step."""
 
     tolerance: float = 1e-6
-    """Volume error that an iterative solve may leave, over the volume [1]: 1 % of what a kept volume may be off."""
+    """Volume error that an iterative solve may leave, over the volume [1]; 1 % of the error that a kept volume may
+    have."""
     most_iterations: int = 200
     recovers: bool = False
-    """Whether a body with several volumes comes back from a start that is inside out, flat or anywhere: until then it
-    has springs with rest length and one volume (docs/theory.md, eq. 8.15). From rest on nothing changes."""
+    """Whether a body with several volumes recovers from a start that is inverted, flat or arbitrary: meanwhile it has
+    springs with rest length and one volume (docs/theory.md, eq. 8.15). A start from rest is not affected."""
 
     name: ClassVar[str] = "implicit_volume"
     order: ClassVar[int] = 1
@@ -217,7 +219,7 @@ class ImplicitVolume(Method):
         return why_not_recover(body) if reason is None and self.recovers else reason
 
     def start(self, body: Body, attachments: tuple[Attachment, ...] = (), v: np.ndarray | None = None) -> State:
-        """The body at rest, or with velocities `v` (n, 3) [m/s], and clusters of its volumes where they are many."""
+        """The body at rest, or with velocities `v` (n, 3) [m/s], and clusters of its volumes if these are many."""
         state = start(body, attachments, v, recovery_of(body, attachments, v) if self.recovers else None)
         rows = state.rows
         if not isinstance(rows, VolumeRows) or len(rows.matrix):

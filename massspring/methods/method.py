@@ -1,4 +1,5 @@
-"""What a method is: settings (a frozen dataclass), claims and capabilities (class variables), one compiled loop."""
+"""The base class of methods: settings (a frozen dataclass), claims and capabilities (class variables), one compiled
+loop."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -20,18 +21,19 @@ from massspring.world.surroundings import Surroundings
 
 
 class Method(Protocol):
-    """One way to advance time. A new one derives from this: a file, and a line in METHODS."""
+    """A method that advances a body in time. To add one, write a subclass in a new file and add a line to METHODS."""
 
     name: ClassVar[str]
-    """Word on the command line."""
+    """Name on the command line."""
     order: ClassVar[int]
     """Claim: global error of the trajectory ~ dt^order."""
     volume_tol: ClassVar[float | None]
-    """Claim: |V/V0 − 1| after a quiet step at half the stability limit; None where a step promises no volume."""
+    """Claim: |V/V0 − 1| after a step without contact changes at half the stability limit; None if the method makes no
+    claim."""
     conserves_angular_momentum: ClassVar[bool] = True
     """Claim: a body in free flight keeps its angular momentum to round-off."""
     capabilities: ClassVar[Capabilities]
-    """What it supports with its default settings; an instance with other settings may have a table of its own."""
+    """Capabilities with default settings; an instance with other settings may override them."""
 
     def why_not(self, body: Body) -> str | None:
         """Why the method cannot advance `body`; None when it can."""
@@ -42,7 +44,8 @@ class Method(Protocol):
         return None
 
     def added_stiffness(self, body: Body) -> csr_array | None:
-        """B [√(N/m)], (3n, r): small oscillations about rest feel B Bᵀ in addition to the springs; None for nothing."""
+        """B [√(N/m)], (3n, r): the method adds the stiffness B Bᵀ to that of the springs at rest; None if it adds
+        none."""
         return None
 
     def start(self, body: Body, attachments: tuple[Attachment, ...] = (), v: np.ndarray | None = None) -> State:
@@ -55,7 +58,7 @@ class Method(Protocol):
 
 
 def begin_frame(state: State, boundary: BoundaryConditions) -> State:
-    """A copy to advance in place, so that the caller's state stays what it was."""
+    """A copy to advance in place, so that the state of the caller does not change."""
     nodes = state.nodes._replace(x=state.nodes.x.copy(), v=state.nodes.v.copy())
     obstacles = len(boundary.radius) + boundary.tips.end.shape[1]
     diagnostics = new_diagnostics(obstacles, boundary.held_displacement.shape[1], state.diagnostics.stage_times)
@@ -65,7 +68,7 @@ def begin_frame(state: State, boundary: BoundaryConditions) -> State:
 
 @contextmanager
 def threaded_frame(state: State, boundary: BoundaryConditions) -> Iterator[State]:
-    """A copy to advance in place; inside, all threads of the state are there."""
+    """A copy to advance in place; inside the context all threads of the state are running."""
     after = begin_frame(state, boundary)
     direction = after.nodes.gradient if after.rows is None else after.rows.push
     with team_at_work(after.frame(boundary), direction):

@@ -1,10 +1,10 @@
 """An ideal gas inside the surface at constant temperature, in an ambient pressure: lam = p0 (V0/V − 1).
 
 Matyka and Ollila, Pressure model of soft body simulation, SIGRAD 2003, with p = nRT/V; nRT = p0 V0 makes the rest shape
-rest (docs/theory.md, eq. 10.8).
+an equilibrium (docs/theory.md, eq. 10.8).
 
-Limits: the volume is not kept, lam/p0 of it is missing as with a penalty; the pressure has no bound as V goes to 0,
-so that a crushed body bursts.
+Limits: the volume is not kept: lam/p0 of it is lost, as with a penalty. The pressure grows without bound as V goes to
+0, so a crushed body bursts.
 """
 
 from dataclasses import dataclass
@@ -37,7 +37,7 @@ class Pressure(Method):
         check_modulus(self.name, "ambient", self.ambient)
 
     def added_stiffness(self, body: Body) -> csr_array:
-        """(K/V0) G Gᵀ, of rank one."""
+        """B [√(N/m)], (3n, 1), with B Bᵀ = (p0/V0) G Gᵀ."""
         return volume_stiffness(body, self.ambient)
 
     def advance(self, state: State, boundary: BoundaryConditions) -> State:

@@ -3,8 +3,8 @@
 Zordan, Celly, Chiu, DiLorenzo, Breathe easy, Symposium on Computer Animation 2004: force k (V0 − V) along the normal of
 each triangle, here in proportion to its area (docs/theory.md, eq. 10.8, 10.10).
 
-Limits: on a closed surface the pyramids add up to the enclosed volume wherever their apex is, so that it *is* the
-penalty, at the price of one more sweep. Forces that are not in proportion to area would push the body about.
+Limits: on a closed surface the pyramids add up to the enclosed volume for any apex, so the method *is* the penalty,
+with one more sweep. Forces that are not in proportion to area would exert a net force on the body.
 """
 
 from dataclasses import dataclass
@@ -25,7 +25,7 @@ class Pyramid(Method):
     """Pushes each triangle out in proportion to what its pyramids miss together."""
 
     bulk_modulus: float = 100_000.0
-    """K = k V0 [Pa]; that of the penalty, so that the two can be compared."""
+    """K = k V0 [Pa]; the default of `Penalty`, so that the two can be compared."""
 
     name: ClassVar[str] = "pyramid"
     order: ClassVar[int] = 1
@@ -36,7 +36,7 @@ class Pyramid(Method):
         check_modulus(self.name, "bulk_modulus", self.bulk_modulus)
 
     def added_stiffness(self, body: Body) -> csr_array:
-        """(K/V0) G Gᵀ, of rank one."""
+        """B [√(N/m)], (3n, 1), with B Bᵀ = (K/V0) G Gᵀ."""
         return volume_stiffness(body, self.bulk_modulus)
 
     def advance(self, state: State, boundary: BoundaryConditions) -> State:

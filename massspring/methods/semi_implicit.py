@@ -1,4 +1,4 @@
-"""Springs without length at the end of the step, pressures at its start: one constant matrix, no passes.
+"""Springs without length are implicit, pressures linearised at the start of the step: one constant matrix, no passes.
 
 Ascher, Ruuth, Wetton (1995), implicit-explicit Euler: zero-length springs are linear, f = −K x, so that
 
@@ -8,9 +8,10 @@ Ascher, Ruuth, Wetton (1995), implicit-explicit Euler: zero-length springs are l
 in HCJ05, with S = J A⁻¹ Jᵀ and a back-solve per iteration.
 
 Limits: the change of Jᵀ with x stays explicit, which bounds dt where pressures are far above mu; long steps lose energy
-and blur what happens within one. Obstacles are met inside facets, where a step moves a force by what the masses alone
-resist, ∝ 1/dt²: at twice the explicit limit a pressed block has 84 % of its force 0.4 s after the press, at ten times
-a sixth. It suits bodies that are held, filled or weighed, not pressed.
+and do not resolve motion within a step. Contact is inside facets, where a step changes a force in proportion to the
+masses alone, ∝ 1/dt², so long steps approach the force slowly: at twice the explicit limit a pressed block has 84 % of
+its force 0.4 s after the press, at ten times a sixth. The method suits bodies that are held, filled or sag under
+gravity, not pressed ones.
 """
 
 from dataclasses import dataclass, replace
@@ -65,14 +66,14 @@ class SemiImplicit(Method):
 
 @dataclass(frozen=True, eq=False)
 class Prepared:
-    """What a run factors once for each step length and damping."""
+    """The factors of a run, one for each step length and damping."""
 
     jacobian: csr_array
     """J at rest [m²], (m, 3n)."""
     factors: dict[tuple[float, float], tuple[SpringFactor, Any]]
 
     def at(self, model: Model, rows: PointRows, dt: float, damping: float) -> tuple[SpringFactor, PointRows]:
-        """The factor for steps of `dt` [s] with `damping` [1/s], and the rows with S⁻¹ of that response."""
+        """The factor for steps of `dt` [s] with `damping` [1/s], and the rows with S⁻¹ for that factor."""
         if (dt, damping) not in self.factors:
             self.factors[dt, damping] = _factored(self.jacobian, model, dt, damping)
         implicit, (diagonal, scale, inverse) = self.factors[dt, damping]

@@ -1,18 +1,20 @@
-"""Extended position-based dynamics on volumes: every tetrahedron, or the whole.
+"""Extended position-based dynamics on volumes: those of all tetrahedra, or the whole.
 
 Macklin, Müller, Chentanez, XPBD: position-based simulation of compliant constrained dynamics, Motion in Games 2016.
-From the predicted positions y the constraints are mended one after the other, a sweep over all of them being an
-iteration: Δp = (V0 − V(y) − C V0 p)/(dt² ∇V·W̃∇V + C V0), in the units of pressures, p = lam/dt² (docs/theory.md,
-eq. 10.14). p is kept over the iterations of a step: without it the answer is hard whatever the compliance C, a mistake
-in public implementations. As iterations go on, it is the compliant volume solved for at the end of the step.
+From the predicted positions y the constraints are corrected one after the other; a sweep over all of them is an
+iteration: Δp = (V0 − V(y) − C V0 p)/(dt² ∇V·W̃∇V + C V0), in the units of pressures, p = lam/dt² (docs/theory.md, eq.
+10.14). p is accumulated over the iterations of a step: without the term C V0 p the constraint is hard for any
+compliance C, a mistake in public implementations. The iterations converge to the compliant volume at the end of the
+step.
 
-Not in the publication: a sweep over tetrahedra ends with one constraint more, the sum of their volumes, as the same
-pressure on all (eq. 10.15). The final pressures stay the same, but corrections of one cell after the other need
-hundreds of sweeps to mend what all cells lack: five leave 2e-4 of the whole without it and 2e-8 with it (ball of 200
-nodes).
+Not in the publication: a sweep over tetrahedra ends with one more constraint, on the sum of their volumes, by an equal
+pressure on all (eq. 10.15). The limit does not change, but without it corrections cell after cell need hundreds of
+sweeps for an error common to all cells: five sweeps leave 2e-4 of the whole volume without it and 2e-8 with it (ball of
+200 nodes).
 
-Limits: what the iterations have not reached depends on their number and on dt. The gradients are those of positions
-under way, so that spin is not kept. Per tetrahedron it locks as `element` does.
+Limits: the error of a finite number of iterations depends on their number and on dt. Gradients are taken at
+intermediate positions, so angular momentum is not conserved. With a constraint per tetrahedron it locks as `element`
+does.
 """
 
 from dataclasses import dataclass, replace
@@ -39,7 +41,7 @@ from massspring.world.obstacles import Attachment
 
 @njit_lean
 def xpbd_frame(frame, cells, compliance, iterations, whole):
-    """One frame (eq. 3.1–3.8, 10.14); returns the last pressure, of cells their mean [Pa]."""
+    """One frame (eq. 3.1–3.8, 10.14); returns the last pressure, with cells their mean [Pa]."""
     nodes, contacts, boundary, diagnostics = frame.nodes, frame.contacts, frame.boundary, frame.diagnostics
     lam, idle, push = 0.0, False, Push(cells.push, 1.0)
     open_frame(frame)
@@ -63,8 +65,8 @@ def xpbd_frame(frame, cells, compliance, iterations, whole):
 
 @njit_lean
 def mend(frame, cells, target, compliance, iterations, whole):
-    """So many sweeps over the volumes (eq. 10.14, 10.15); the pressure of the whole [Pa], and whether a wrong volume
-    had nothing to push on in the last of them."""
+    """Makes `iterations` sweeps over the volumes (eq. 10.14, 10.15). Returns the pressure of the whole [Pa], and
+    whether a volume with an error had no gradient in the last sweep."""
     model, contacts, scale = frame.model, frame.contacts, frame.boundary.dt * frame.boundary.dt
     lam, idle = 0.0, False
     for _ in range(iterations):
@@ -81,10 +83,10 @@ class Xpbd(Method):
     """Corrects volumes of the predicted shape one after the other, in a fixed number of sweeps."""
 
     volumes: Literal["element", "whole"] = "element"
-    """Each tetrahedron's, or the one of the whole."""
+    """Volumes that are kept: that of each tetrahedron, or the whole."""
     iterations: int = 5
-    """Sweeps over the volumes in a step. What five leave of single tetrahedra shows in the force on a pressed ball: it
-    still grows with every further sweep, towards the mode one. The whole is kept from two on."""
+    """Sweeps over the volumes in a step. With "element" five are not converged: the force on a pressed ball still grows
+    with every further sweep. With "whole" two are enough."""
     compliance: float = 0.0
     """C = 1/K [1/Pa]; 0 is hard."""
 
@@ -109,13 +111,13 @@ class Xpbd(Method):
             object.__setattr__(self, "capabilities", replace(self.capabilities, keeps="whole"))
 
     def start(self, body: Body, attachments: tuple[Attachment, ...] = (), v: np.ndarray | None = None) -> State:
-        """With the cells at rest."""
+        """The body at rest, or with velocities `v` (n, 3) [m/s], with its cells at rest."""
         return start(body, attachments, v, cells_of(body))
 
     def advance(self, state: State, boundary: BoundaryConditions) -> State:
         """One frame."""
         after, cells = begin_frame(state, boundary), own_cells(state)
-        # The last forces tell where contact will be; the old state keeps its own.
+        # The forces of the last step are used to find contacts; a copy leaves those of the old state unchanged.
         cells = cells._replace(push=cells.push.copy())
         whole = self.volumes == "whole"
         lam = xpbd_frame(after.frame(boundary), cells, self.compliance, self.iterations, whole)

@@ -1,4 +1,4 @@
-"""What a set-up is checked for before it runs, and its surroundings in each frame; each complaint is one sentence."""
+"""Checks of a set-up before it runs, and of its surroundings in each frame; each error message is one sentence."""
 
 import warnings
 from collections.abc import Collection, Mapping
@@ -22,7 +22,8 @@ from massspring.world.surroundings import Surroundings
 from massspring.world.trajectories import Ramp
 
 INSIDE = 1e-6
-"""Of the body's size: what an obstacle may reach into it at the start, round-off of positions that touch."""
+"""Depth, over the size of the body, to which an obstacle may reach into it at the start: round-off of touching
+positions."""
 
 
 def check_surroundings(gravity: tuple[float, float, float], damping: float, dt: float) -> None:
@@ -52,8 +53,7 @@ def check_nodal(what: str, values: np.ndarray | None, body: Body) -> None:
 
 
 def check_targets(targets: Mapping[str, Ramp], body: Body, method: Method) -> None:
-    """Raises MassSpringError for a target that the method would not read, of a volume that is not kept, or one that
-    falls to nothing."""
+    """Raises MassSpringError for a target that the method ignores, that names no kept volume, or that falls to 0."""
     supported = method.capabilities.targets
     if targets and isinstance(supported, No):
         raise MassSpringError(
@@ -71,7 +71,8 @@ def check_targets(targets: Mapping[str, Ramp], body: Body, method: Method) -> No
 def check_body(body: Body, method: Method) -> None:
     """Raises MassSpringError for a body that the method cannot advance.
 
-    Springs without length need a volume at every node or for a few: one for many would let some shrink as others grow.
+    Springs without length need one volume for every node or every few nodes: within one volume of many nodes some parts
+    would shrink as others grow.
     """
     reason = method.why_not(body)
     if reason is not None:
@@ -91,8 +92,8 @@ def check_among(surroundings: Surroundings, method: Method) -> None:
 
 
 def check_facets(precision: str, body: Body, obstacles: Collection[object]) -> None:
-    """Raises MassSpringError for single precision where obstacles touch points inside facets: what their forces settle
-    to would differ in the fourth digit."""
+    """Raises MassSpringError for single precision if obstacles touch points inside facets: the forces would differ in
+    the fourth digit."""
     if precision == "float32" and len(body.contact_facets) and obstacles:
         raise MassSpringError(
             "obstacles touch this quadratic body inside its facets, which runs in float64 only; "
@@ -101,8 +102,8 @@ def check_facets(precision: str, body: Body, obstacles: Collection[object]) -> N
 
 
 def check_probe(number: int, probe: Probe, method: Method, body: Body, x: np.ndarray) -> None:
-    """Raises MassSpringError for a thin probe that the method or the body does not meet, that starts inside the body at
-    `x` (n, 3) or is too thick for contact with single triangles."""
+    """Raises MassSpringError for a thin probe that the method or the body does not support, that starts inside the body
+    at `x` (n, 3), or that is too thick for contact with single triangles."""
     supported = method.capabilities.thin_probes
     if isinstance(supported, No):
         raise MassSpringError(
@@ -140,7 +141,8 @@ def _starts_inside(number: int, depth: float) -> MassSpringError:
 
 
 def starting_depth(obstacle: Plane | Sphere | Capsule, body: Body, x: np.ndarray) -> float:
-    """How deep the body at `x` (n, 3) reaches into an obstacle at the start [m]; one between all nodes counts too."""
+    """How deep the body at `x` (n, 3) reaches into an obstacle at the start [m]; an obstacle that lies between the
+    nodes counts too."""
     depth = -float(obstacle.gap(x[body.surface_nodes], 0.0).min())
     if isinstance(obstacle, Plane):
         return depth
@@ -152,7 +154,8 @@ def starting_depth(obstacle: Plane | Sphere | Capsule, body: Body, x: np.ndarray
 
 
 def check_threads(threads: int, method: Method) -> None:
-    """Raises MassSpringError for what is no number of threads, for more than cores, and where `method` has no use."""
+    """Raises MassSpringError for an invalid number of threads, for more threads than cores, and if `method` cannot use
+    them."""
     if isinstance(threads, bool) or not isinstance(threads, int) or threads < 1:
         raise MassSpringError(f"{threads!r} is not a number of threads; give 1 or more")
     if threads > cores():
@@ -201,7 +204,7 @@ def check_slip(lost: int, pairs: int) -> None:
 
 
 def check_probes(state: State, obstacles: tuple[Obstacle, ...]) -> str | None:
-    """Which thin probe was driven through tissue that had nowhere to go, or None."""
+    """Message that names the first thin probe that was driven through held tissue, or None."""
     if state.probing is None or not state.probing.passed.any():
         return None
     thin = [number for number, obstacle in enumerate(obstacles) if isinstance(obstacle, Probe)]
@@ -215,7 +218,7 @@ def check_probes(state: State, obstacles: tuple[Obstacle, ...]) -> str | None:
 
 
 def check_loads(boundary: BoundaryConditions) -> str | None:
-    """Which part of the outside world has no place or no size any more, or None."""
+    """Message that names the first obstacle, attachment or target that is not finite, or None."""
     for what, values in (
         ("obstacle", boundary.position),
         ("attachment", boundary.held_displacement),

@@ -1,4 +1,4 @@
-"""Changes of a body during a run, as by a cut: what follows when, and what must stay the same."""
+"""Changes of the body during a run, such as a cut: their order in time, and the quantities that they must conserve."""
 
 from dataclasses import dataclass, replace
 
@@ -14,55 +14,56 @@ from massspring.methods.method import Method
 from massspring.world.obstacles import Attachment
 
 SAME = 1e-9
-"""Relative: masses and springs before and after are sums over the same cells, up to round-off."""
+"""Relative difference allowed between masses or springs before and after: sums over the same cells, up to round-off."""
 
 
 @dataclass(frozen=True, eq=False)
 class Event:
-    """Another body takes over between two frames, in the places and with the velocities of the one before."""
+    """A new body replaces the present one between two frames and takes over its positions and velocities."""
 
     body: Body
     parent: np.ndarray
-    """For each of its nodes the one it was before, (n',)."""
+    """For each node of `body` its node before the event, (n',)."""
     volume_parent: np.ndarray
-    """For each of its kept volumes the one it was a part of before, (m',)."""
+    """For each kept volume of `body` the volume before the event that it was a part of, (m',)."""
     frame: int
-    """How many frames come before it."""
+    """Number of frames before the event."""
     attachments: tuple[Attachment, ...] = ()
-    """As many as before, in the same order, by the nodes of the new body."""
+    """The attachments of the new body, as many as before and in the same order."""
     ended: tuple[int, ...] = ()
-    """Kept volumes before it that nothing keeps any more, as that of a lumen that is opened."""
+    """Volumes that are no longer kept after the event, such as that of an opened lumen."""
     pairs: np.ndarray | None = None
     """Nodes behind a cut and their copies in front of it, (p, 2), if its faces touch from then on (`Setup.pairs`)."""
     growth: Growth | None = None
-    """What it has beyond copies of nodes and springs; None: nothing."""
+    """New nodes and springs beyond copies; None if there are none."""
 
     def carried(self, values: np.ndarray) -> np.ndarray:
-        """Places or velocities (n', 3) of its nodes by those of the nodes before, (n, 3)."""
+        """Positions or velocities of the nodes of `body`, (n', 3), from those of the nodes before, (n, 3)."""
         return values[self.parent] if self.growth is None else self.growth.carry @ values
 
 
 @dataclass(frozen=True, eq=False)
 class Easing:
-    """Volumes that an event found off their targets, on the way there: all on one clock, so that their sum is kept."""
+    """Moves volumes that an event found off their targets back to them, all in the same time, so that their sum is
+    kept."""
 
     at: float
     """Time of the event [s]."""
     off: np.ndarray
-    """By how much each kept volume was off then [m³], (m,)."""
+    """Deviation of each kept volume from its target at the event [m³], (m,)."""
     time: float
-    """Until they are there [s]."""
+    """Time until the volumes reach their targets [s]."""
 
     def left(self, t: np.ndarray) -> np.ndarray:
-        """How far off each volume should still be at times `t` (q,) [s], (q, m) [m³]."""
+        """Remaining deviation of each volume from its target at times `t` (q,) [s], (q, m) [m³]."""
         share = np.clip(1.0 - (t - self.at) / self.time, 0.0, 1.0) if self.time > 0 else np.zeros(len(t))
         return share[:, None] * self.off
 
 
 @dataclass(frozen=True, eq=False)
 class LettingIn:
-    """New springs, which begin without force: their rest lengths are led to those at rest as a wave of shear passes
-    the body."""
+    """Moves the rest lengths of new springs, which start without force, to those of the rest shape in the time that a
+    shear wave takes through the body."""
 
     springs: np.ndarray
     """Their numbers, (q,)."""
@@ -71,22 +72,22 @@ class LettingIn:
     at: float
     """Time of the event [s]."""
     time: float
-    """Until they have their rest lengths [s]."""
+    """Time until they reach the rest lengths of the rest shape [s]."""
 
     def done(self, t: float) -> bool:
-        """Whether they have them at time t [s]."""
+        """Whether they have reached them at time t [s]."""
         return t - self.at >= self.time
 
     def lengths(self, rest_length: np.ndarray, t: float) -> np.ndarray:
-        """The rest lengths of all springs at time t [s], in the end `rest_length` (s,) [m]."""
+        """The rest lengths of all springs at time t [s], (s,) [m]; the final ones are `rest_length`."""
         lengths, share = rest_length.copy(), 1.0 if self.done(t) else (t - self.at) / self.time
         lengths[self.springs] = self.begin + share * (rest_length[self.springs] - self.begin)
         return lengths
 
 
 def kept_momentum(v: np.ndarray, x: np.ndarray, mass: np.ndarray, growth: Growth) -> np.ndarray:
-    """Velocities (n', 3) [m/s] at places `x` (n', 3) [m] with a rigid motion of each piece by which its momentum and
-    angular momentum with `mass` (n',) [kg] are those that it had with the mass before."""
+    """Velocities `v` (n', 3) [m/s] at positions `x` (n', 3) [m] plus a rigid motion of each piece, so that with `mass`
+    (n',) [kg] the piece has the momentum and angular momentum that it had with its masses before."""
     kept = v.copy()
     for k in np.unique(growth.piece):
         of = np.flatnonzero(growth.piece == k)
@@ -120,7 +121,7 @@ def check_events(
 
 
 def check_event(event: Event, before: Body) -> None:
-    """Raises MassSpringError for a body that does not take over mass and springs of the one before."""
+    """Raises MassSpringError for a body whose masses, springs or volumes do not match those before the event."""
     parent, volumes = np.asarray(event.parent), np.asarray(event.volume_parent)
     kept = np.setdiff1d(np.arange(before.kept.count), event.ended)
     if before.kept.count - len(kept) != len(event.ended):
@@ -155,8 +156,8 @@ def check_event(event: Event, before: Body) -> None:
 
 
 def _check_growth(event: Event, growth: Growth, before: Body) -> None:
-    """Raises MassSpringError for new nodes out of place, a piece that gains or loses mass, and springs that are not new
-    and stiffer than before."""
+    """Raises MassSpringError for misplaced new nodes, for a piece that gains or loses mass, and for existing springs
+    that become stiffer."""
     body = event.body
     if np.abs(event.carried(before.rest) - body.rest).max() > SAME * before.size:
         raise MassSpringError("a new node is not carried to its place at rest; give it weights that meet it")

@@ -1,4 +1,4 @@
-"""What a run leaves behind, frame by frame."""
+"""The record of a run, frame by frame."""
 
 from collections.abc import Collection
 from dataclasses import dataclass
@@ -17,8 +17,8 @@ from massspring.world.clock import Clock
 from massspring.world.obstacles import Obstacle, Probe
 
 EXTRA = ("kinetic", "elastic")
-"""Fields that can be left out: a sweep over all nodes and springs after every frame, which only an energy balance
-reads."""
+"""Optional fields: they take a pass over all nodes and springs after every frame, and only an energy balance needs
+them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,7 +30,7 @@ class History:
     volume: np.ndarray
     """Of each kept volume [m³], (F, m)."""
     volume_target: np.ndarray
-    """What each kept volume should be at the end of each frame [m³], (F, m)."""
+    """Target of each kept volume at the end of each frame [m³], (F, m)."""
     pressure: np.ndarray
     """lam of the last step of the frame [Pa], (F, m)."""
     kinetic: np.ndarray
@@ -40,8 +40,8 @@ class History:
     contact_force: np.ndarray
     """Mean force of each obstacle on the body during the frame [N], (F, o, 3)."""
     penetration: np.ndarray
-    """How deep the deepest surface node, for a thin probe the surface, lies in each obstacle at the end of the frame
-    [m], (F, o)."""
+    """Penetration of the deepest surface node into each obstacle at the end of the frame, for a thin probe of the
+    surface [m], (F, o)."""
     held_force: np.ndarray
     """Mean force of each attachment on the body during the frame [N], (F, g, 3)."""
     min_j: np.ndarray
@@ -63,55 +63,58 @@ class History:
     singular_steps: int
     """Steps in which a volume had no gradient to push on."""
     limited_corrections: int
-    """Steps that made up for a part only of a wrong volume."""
+    """Steps that corrected only part of a volume error."""
     iterations: np.ndarray
-    """For the multipliers of each frame: their sum over its steps, and the most in one step, (F, 2) int64."""
+    """Iterations for the multipliers in each frame: sum over its steps, and the most in one step, (F, 2) int64."""
     probe_counts: np.ndarray
-    """What thin probes did in each frame, one column for each of kernels.probe_layout.COUNTS, (F, 7) int64."""
+    """Counts of the stage of thin probes in each frame, one column for each of kernels.probe.arrays.COUNTS, (F, 7)
+    int64."""
     passages: tuple["Passage", ...] = ()
-    """Of each event that came."""
+    """One for each event that took place."""
 
 
 @dataclass(frozen=True)
 class Passage:
-    """What an event changed at the moment at which it came, and what it cost."""
+    """Change of energy and momentum by an event, and its computing time."""
 
     energy: float
     """Change of kinetic and elastic energy over their sum before [1]."""
     momentum: float
     """Size of the change of momentum over the sum of its sizes in all nodes before [1]."""
     ns: int
-    """Wall time [ns]; all that can be made before the run is made there."""
+    """Wall time of the event [ns], without the preparation before the run."""
 
 
 @dataclass(frozen=True, eq=False)
 class Numbers:
-    """Where what is recorded, in the numbers of the last body of a run, is in the body of the moment."""
+    """Maps nodes and volumes of the last body of a run, by which results are recorded, to those of the current body."""
 
     nodes: np.ndarray
-    """The node that each node is still a part of, (n,)."""
+    """For each node of the last body its node in the current body, (n,)."""
     volumes: np.ndarray
-    """The same of the kept volumes, (m,)."""
+    """For each kept volume of the last body the current volume of which it is a part, (m,)."""
     carry: csr_array | None = None
-    """Where nodes are by those of the moment, (n, k), where some are not there yet; None: at `nodes`."""
+    """Weights that give node positions from the k current nodes, (n, k), if some nodes do not exist yet; None: use
+    `nodes`."""
 
     @property
     def matrix(self) -> csr_array:
-        """`carry`, or what stands for it, (n, k)."""
+        """`carry`, or the matrix equivalent to `nodes`, (n, k)."""
         rows = np.arange(len(self.nodes))
         return csr_array((np.ones(len(rows)), (rows, self.nodes))) if self.carry is None else self.carry
 
     def carried(self, values: np.ndarray) -> np.ndarray:
-        """Places or velocities (n, 3) by those of the moment, (k, 3)."""
+        """Positions or velocities (n, 3) from those of the current nodes, (k, 3)."""
         return values[self.nodes] if self.carry is None else self.carry @ values
 
     def after(self, before: "Numbers") -> "Numbers":
-        """These where the body of the moment is not yet the one before the last, of which `before` says the same."""
+        """This map composed with `before`, which maps the nodes of its target body to those of an earlier body."""
         carry = None if before.carry is None and self.carry is None else self.matrix @ before.matrix
         return Numbers(before.nodes[self.nodes], before.volumes[self.volumes], carry)
 
     def parts(self, volumes: np.ndarray, whole: np.ndarray) -> np.ndarray:
-        """What each of the `volumes` (m,) has of the values `whole` of those that they are still a part of, (m,)."""
+        """The values `whole` of the current volumes, divided among their parts in proportion to `volumes` (m,),
+        (m,)."""
         together = np.bincount(self.volumes, weights=volumes, minlength=len(whole))
         return volumes * (whole[self.volumes] / together[self.volumes])
 
@@ -124,14 +127,15 @@ def kinetic_energy(state: State) -> float:
 
 
 def elastic_energy(state: State) -> float:
-    """Of springs and membrane [J], with what taut springs have at rest."""
+    """Energy of springs and membrane [J], including that of taut springs at rest."""
     net, x = state.model, state.nodes.x.astype(np.float64, copy=False)
     taut = spring_energy(x, net.ends, net.rest_length, net.stiffness)
     return taut + membrane_energy(x, net.membrane)
 
 
 def passage(before: State, was: Body, after: State, now: Body, ns: int) -> Passage:
-    """Of an event at which one body became the other, in their states before and after it."""
+    """The changes by an event that replaced body `was` in state `before` by body `now` in state `after`; `ns`: its wall
+    time."""
     energy, changed = (
         kinetic_energy(state) + elastic_energy(state) - body.rest_energy + body.local_energy(state.x)
         for state, body in ((before, was), (after, now))
@@ -147,8 +151,8 @@ def _over(part: float, whole: float) -> float:
 
 
 class Recorder:
-    """Fills the arrays of a History; a minimum J is only looked for where there are tetrahedra, and of `EXTRA` only
-    what is asked for is computed. Raises MassSpringError for an unknown extra field."""
+    """Fills the arrays of a History. It computes only those fields of `EXTRA` that are in `extra`. Raises
+    MassSpringError for an unknown extra field."""
 
     def __init__(
         self,
@@ -191,7 +195,8 @@ class Recorder:
         self.passages: list[Passage] = []
 
     def record(self, frame: int, state: State, elapsed_ns: int, numbers: Numbers | None = None) -> None:
-        """Reads the state after frame number `frame` (0, 1, …), which has other `numbers` until the last event."""
+        """Records the state after frame number `frame` (0, 1, …); `numbers` maps to it from the last body, None after
+        the last event."""
         x = state.x.astype(np.float64, copy=False)
         x = x if numbers is None else numbers.carried(x)
         self.volume[frame] = self.volumes.measure(x)
@@ -221,8 +226,8 @@ class Recorder:
             self.kept[frame + 1] = x
 
     def record_targets(self, frame: int, targets: np.ndarray, numbers: Numbers | None) -> None:
-        """What the volumes should be after a frame on the way to their targets (m,) [m³]; those that are still one
-        have shares of what that should be."""
+        """Records the targets of the current volumes after a frame [m³]; parts of a volume that is not yet divided get
+        shares of its target."""
         self.volume_target[frame] = targets if numbers is None else numbers.parts(self.volume[frame], targets)
 
     def finished(self) -> History:

@@ -14,12 +14,12 @@ from massspring.methods.method import Method
 
 Precision = Literal["float64", "float32"]
 KEPT_DOUBLE = frozenset({"sums", "matrix", "scale", *OF_EACH_VOLUME})
-"""Sums over many nodes and what is solved with them: as long as there are slices or volumes, so they cost nothing."""
+"""Arrays that stay float64: sums over many nodes and the systems solved with them. They are short and cost no time."""
 
 
 def check_precision(precision: str, method: Method) -> None:
-    """Raises MassSpringError for what is neither float64 nor float32, and for float32 where `method` does not claim
-    it."""
+    """Raises MassSpringError for a precision other than float64 and float32, and for float32 if `method` does not
+    support it."""
     if precision not in ("float64", "float32"):
         raise MassSpringError(f"unknown precision '{precision}'; choose float64 or float32")
     supported = method.capabilities.float32
@@ -33,7 +33,7 @@ def check_precision(precision: str, method: Method) -> None:
 def in_precision(state: State, precision: Precision) -> State:
     """`state` with the arrays of its nodes, springs and volumes as `precision`; float64 leaves it as it is.
 
-    What a method or a thin probe remembers of its own stays in double precision.
+    The memory of the method and the arrays of thin probes stay in double precision.
     """
     if precision == "float64":
         return state
@@ -43,7 +43,7 @@ def in_precision(state: State, precision: Precision) -> State:
 
 
 def _cast(part: Any, real: np.dtype) -> Any:
-    """A tuple of arrays, with tuples inside, whose arrays of float64 are `real`."""
+    """A (nested) tuple of arrays with its float64 arrays converted to `real`."""
     changed = {}
     for name, value in part._asdict().items():
         if isinstance(value, tuple):

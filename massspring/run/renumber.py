@@ -1,6 +1,6 @@
-"""The numbers nodes have during a run: those of a slice follow each other, and neighbours are near in memory.
+"""Node numbers during a run: the nodes of a slice are consecutive, and neighbours are near in memory.
 
-Outside of a run the numbers of the mesh hold: `State.x` and `State.v` are in them.
+Outside a run the numbers of the mesh apply; `State.x` and `State.v` use them.
 """
 
 from dataclasses import dataclass, replace
@@ -15,19 +15,19 @@ from massspring.methods.method import Method
 from massspring.world.obstacles import Attachment
 
 MANY = 512
-"""Nodes from which on it pays: what a step reads and writes of fewer lies in the nearest cache in any order."""
+"""Fewest nodes for which renumbering pays: the data of smaller bodies fits the first-level cache in any order."""
 
 
 @dataclass(frozen=True, eq=False)
 class Numbered:
-    """A body with the numbers of a run."""
+    """A body with the node numbers of a run."""
 
     body: Body
     permutation: np.ndarray | None
-    """Number in `body` of each node of the mesh, (n,); None where it has the mesh's."""
+    """Number in `body` of each node of the mesh, (n,); None if they are the same."""
 
     def start(self, method: Method, attachments: tuple[Attachment, ...], velocity: np.ndarray | None) -> State:
-        """The body at rest, or with velocities (n, 3) [m/s]; all that is given has the numbers of the mesh.
+        """The body at rest, or with velocities (n, 3) [m/s]; arguments and results use the numbers of the mesh.
 
         Raises MassSpringError for bad attachments.
         """

@@ -1,4 +1,4 @@
-"""What a run is given: a body in its surroundings, checked."""
+"""The set-up of a run: a body in its surroundings, checked."""
 
 import warnings
 from collections.abc import Mapping
@@ -54,13 +54,13 @@ class Setup:
     """Initial velocities [m/s], (n, 3); None: at rest."""
     targets: Mapping[str, Ramp] = field(default_factory=dict)
     """Name of a kept volume -> its target over time as a factor of its rest volume; unnamed ones stay at 1.
-    What is faster than the body can follow without being thrown apart is ramped, with a warning."""
+    A target that changes faster than the body can follow is ramped, with a warning."""
     positions: np.ndarray | None = None
     """Initial positions [m], (n, 3); None: those at rest."""
     precision: Precision = "float64"
     """Of the state; "float32" is faster and meets volumes to 1e-5 wherever the body lies, for methods that claim it."""
     threads: int = 1
-    """That share a step; the result is the same to the last bit. Pays for bodies of some thousand nodes."""
+    """Threads that share a step; the result is the same to the last bit. They pay for bodies of some thousand nodes."""
     events: tuple[Event, ...] = ()
     """Changes of the body between frames, such as cuts."""
     pairs: np.ndarray | None = None
@@ -124,7 +124,7 @@ class Setup:
 
     @property
     def probes(self) -> tuple[Probe, ...]:
-        """The thin ones among the obstacles; they have a stage of their own."""
+        """The thin probes among the obstacles; a separate stage of the step treats them."""
         return tuple(o for o in self.obstacles if isinstance(o, Probe))
 
     @property
@@ -134,24 +134,24 @@ class Setup:
 
     @cached_property
     def followed(self) -> dict[str, Ramp]:
-        """The targets as they are followed (massspring.world.targets)."""
+        """The targets with a bounded rate (massspring.world.targets)."""
         rate = fastest_filling(self.body) if self.targets else 0.0
         return {name: followed(ramp, rate) for name, ramp in self.targets.items()}
 
     @property
     def ramped(self) -> list[str]:
-        """Names of the volumes whose target is too fast to be followed as it is."""
+        """Names of the volumes whose target had to be slowed down."""
         return [name for name, ramp in self.followed.items() if ramp is not self.targets[name]]
 
     @cached_property
     def inside(self) -> Numbered:
-        """The body with the numbers its nodes have during a run."""
+        """The body with the node numbers of the run."""
         return numbered(self.body)
 
     @cached_property
     def origin(self) -> np.ndarray:
-        """What positions are relative to during the run [m], (3,): in single precision the middle of the body at the
-        start, for its digits are those of the largest coordinate; else 0."""
+        """Origin of positions during the run [m], (3,): in single precision the middle of the body at the start, since
+        the largest coordinate limits the accuracy; else 0."""
         if self.precision == "float64":
             return np.zeros(3)
         x = self.body.rest if self.positions is None else self.positions
@@ -177,7 +177,7 @@ class Setup:
 
     @cached_property
     def _unmoved(self) -> dict[str, Any]:
-        """What is the same in the drives of all frames."""
+        """The boundary conditions that are the same in all frames."""
         solids = self.solids
         return {
             "dt": self.clock.dt,
@@ -192,8 +192,8 @@ class Setup:
         }
 
     def boundary(self, frame: int, easing: Easing | None = None) -> BoundaryConditions:
-        """The outside world during frame number `frame` (0, 1, …): positions at the end of each of its steps, relative
-        to `origin`."""
+        """The boundary conditions during frame number `frame` (0, 1, …), with positions at the end of each step
+        relative to `origin`."""
         dt = self.clock.dt
         t = frame * self.clock.frame + dt * np.arange(1, self.clock.steps + 1)
         solids, probes = self.solids, self.probes
@@ -207,7 +207,8 @@ class Setup:
         )
 
     def volume_targets(self, t: np.ndarray, easing: Easing | None = None) -> np.ndarray:
-        """What each kept volume should be at times `t` (q,) [s], (q, m) [m³]; after an event on the way there."""
+        """Target of each kept volume at times `t` (q,) [s], (q, m) [m³]; after an event `easing` adds the remaining
+        deviation."""
         factors = np.ones((len(t), self.body.kept.count))
         for name, ramp in self.followed.items():
             factors[:, self.body.kept.names.index(name)] = ramp(t)

@@ -14,7 +14,8 @@ from massspring.run.setup import Setup
 from massspring.run.stages import stages_of
 
 ESCAPED = 20.0
-"""A node this many body sizes from rest, beyond any obstacle's push, has left: the run has diverged."""
+"""Distance of a node from its rest position, in body sizes, beyond which the run counts as diverged; no obstacle pushes
+so far."""
 
 
 def check_state(state: State, body: Body) -> str | None:
@@ -34,7 +35,7 @@ def simulate(
     time_limit: float = math.inf,
     extra: Collection[str] = EXTRA,
 ) -> History:
-    """Runs all frames, or up to the first that diverges, and returns what happened.
+    """Runs all frames, or up to the first that diverges, and returns the history.
 
     `snapshots`: numbers (1 … F) of the frames after which positions are kept. `on_frame(number)` is called after each.
     A run that takes more than `time_limit` [s] of this thread's processor time ends early. `extra`: which of

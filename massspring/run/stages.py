@@ -1,4 +1,4 @@
-"""A run as a row of set-ups, each prepared before the first frame, from one event to the next."""
+"""A run as a sequence of stages between events, all prepared before the first frame."""
 
 from dataclasses import dataclass, replace
 
@@ -22,32 +22,33 @@ class Stage:
 
     setup: Setup
     start: State
-    """At its beginning; until the stage is entered with the body at rest."""
+    """State at the beginning of the stage; before the stage is entered, the body at rest."""
     frame: int = 0
-    """Its first."""
+    """Its first frame."""
     before: Numbers | None = None
-    """What its nodes and volumes were in the stage before it."""
+    """Maps its nodes and volumes to those of the stage before."""
     last: Numbers | None = None
-    """What the nodes and volumes of the last stage are in it; None for themselves."""
+    """Maps nodes and volumes of the last stage to those of this one; None for the last stage."""
     easing: Easing | None = None
     filling: float = 0.0
-    """Share of its volume by which a body can be led in a second; of a stage that follows an event."""
+    """Largest relative rate at which a volume can follow its target [1/s]; for a stage that follows an event."""
     growth: Growth | None = None
-    """What its body has that no copy is."""
+    """New nodes and springs of its body that are not copies."""
     lanes: np.ndarray | None = None
-    """Of a body with new springs: the number of the one in each lane of its slices, −1 for none."""
+    """For a body with new springs: the number of the spring in each lane of its slices, −1 for none."""
     letting_in: LettingIn | None = None
 
     def boundary(self, frame: int) -> BoundaryConditions:
-        """The outside world during frame number `frame` of the run."""
+        """The boundary conditions during frame number `frame` of the run."""
         return self.setup.boundary(frame, self.easing)
 
     def targets_after(self, frame: int) -> np.ndarray:
-        """What its volumes should be at the end of that frame [m³], (m,)."""
+        """Targets of its volumes at the end of that frame [m³], (m,)."""
         return self.setup.volume_targets(np.array([(frame + 1) * self.setup.clock.frame]), self.easing)[0]
 
     def entered(self, state: State) -> "Stage":
-        """The stage as it begins where the one before it ended: every copy of a node in its place, with its speed."""
+        """The stage started from the last `state` of the one before: every copy has the position and velocity of its
+        node."""
         assert self.before is not None  # the first stage is entered at rest
         body = self.setup.body
         x, v = self.before.carried(state.x), self.before.carried(state.v)
@@ -70,7 +71,7 @@ class Stage:
         return replace(stage, start=stage.let_in(start, self.frame))
 
     def let_in(self, state: State, frame: int) -> State:
-        """The state at the beginning of that frame of the run, with the rest lengths that new springs then have."""
+        """The state with the rest lengths that new springs have at the beginning of that frame of the run."""
         clock = self.setup.clock
         if self.letting_in is None or self.letting_in.done((frame - 1) * clock.frame):
             return state
@@ -83,7 +84,7 @@ class Stage:
 
 
 def stages_of(setup: Setup) -> list[Stage]:
-    """The stages of a run, the states of all made: entering one is a copy of positions and velocities."""
+    """The stages of a run with all states prepared, so that entering one only copies positions and velocities."""
     stages = [Stage(replace(setup, events=()) if setup.events else setup, setup.start())]
     for event, later in zip(setup.events, setup.later, strict=True):
         grown = event.growth

@@ -1,1 +1,1 @@
-"""What surrounds a body: obstacles, attachments, the clock, targets of volumes."""
+"""Surroundings of a body: obstacles, attachments, clock, targets of volumes."""

@@ -1,4 +1,4 @@
-"""Frames and steps: a frame is what a user sees, a step what the method takes."""
+"""Frames and steps: results are recorded after each frame, and the method advances by steps."""
 
 import math
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""What a body meets in a run, as far as a method may refuse it."""
+"""Properties of the surroundings of a body that a method may refuse."""
 
 from dataclasses import dataclass
 
@@ -15,7 +15,7 @@ class Surroundings:
     gravity: tuple[float, float, float] = (0.0, 0.0, 0.0)
     """[m/s²]."""
     targets: bool = False
-    """Whether a kept volume is to change."""
+    """Whether a target is given for a kept volume."""
     moved: bool = False
     """Whether the body starts with velocities, or in another shape than at rest."""
 

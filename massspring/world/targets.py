@@ -1,7 +1,7 @@
-"""How fast a kept volume follows its target: a jump is ramped, for it would throw the body apart.
+"""Limits how fast a kept volume follows its target: a jump would tear the body apart, so it is ramped.
 
 A correction of ΔV within one step leaves ½ (ΔV/dt)²/(G·W·G) of kinetic energy in the body: the shorter the step, the
-worse. Followed at a bounded rate, a jump costs the same whatever the step is.
+worse. At a bounded rate this energy does not depend on the step.
 """
 
 import math
@@ -42,7 +42,7 @@ def _later(target: Ramp) -> tuple[float, ...]:
 
 
 def _follow(target: Ramp, rate: float, begin: float, end: float, path: tuple[list[float], list[float]]) -> None:
-    """Goes on from the last point of `path` while the target is straight, from `begin` to `end` [s]."""
+    """Extends `path` from its last point while the target is linear, from `begin` to `end` [s]."""
     start, last = float(target(begin)), path[1][-1]
     slope = (float(target(end)) - start) / (end - begin) if math.isfinite(end) else 0.0
     gap = start - last

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Trajectory:
-    """Displacement over time, straight between key positions and still outside them."""
+    """Displacement over time, linear between key positions and constant outside them."""
 
     times: tuple[float, ...] = (0.0,)
     """[s], ascending."""
@@ -41,7 +41,7 @@ class Trajectory:
 
     @cached_property
     def _keys(self) -> tuple[np.ndarray, np.ndarray]:
-        """Times (k,) and displacements by axis (3, k) as arrays: a run asks for a place at every frame."""
+        """Times (k,) and displacements by axis (3, k) as arrays, since a run evaluates them in every frame."""
         return np.array(self.times), np.array(self.displacements).T.copy()
 
 
@@ -50,7 +50,7 @@ STILL = Trajectory()
 
 @dataclass(frozen=True)
 class Ramp:
-    """A number over time, straight between key values and still outside them."""
+    """A number over time, linear between key values and constant outside them."""
 
     times: tuple[float, ...] = (0.0,)
     """[s], ascending."""

@@ -2,13 +2,14 @@
 
 Augmented Lagrangian (Alart & Curnier 1991; Wriggers, Computational Contact Mechanics, 2006, ch. 6): the nominal
 pressure is t = max(0, m - eps g), m the multiplier [Pa], g the gap [m], eps the penalty [Pa/m], and the potential
-sum w (t² - m²) / (2 eps). Never at the vertices of a six-node facet: an even pressure loads them with zero.
-No slip: a point that touched at the end of a load step sticks to the place of the obstacle that it touched, by the
-traction T = m_T - eps s, s its slip across the normal there; it is let go when its pressure ends. The place is known to
-the length of a load step: shorter steps for a contact that spreads over what it grips.
+sum w (t² - m²) / (2 eps). Contact is not at nodes, because a uniform pressure gives no force at the vertices of a
+six-node facet. No slip: a point that touched at the end of a load step sticks to the place of the obstacle that it
+touched, by the traction T = m_T - eps s, s its slip tangential to the obstacle there; it is released when its pressure
+ends. The place is accurate to the length of a load step: take shorter steps for a no-slip contact that spreads.
 
-Order 4 has as many points to a facet as nodes. More points ask for more than the nodes can give where a facet is
-partly in contact; between fewer the body sinks in, three to thirty times deeper than a thousandth at three points.
+The rule of order 4 has as many points as a facet has nodes. With more points a facet in partial contact has more
+conditions than degrees of freedom; with fewer the body penetrates between the points: with three points by three to
+thirty times a thousandth.
 """
 
 from typing import NamedTuple
@@ -21,12 +22,12 @@ from reference_fem.model.obstacles import gap_into, gaps
 
 
 class Grip(NamedTuple):
-    """What no-slip obstacles hold; arrays of length 0 where all are frictionless."""
+    """Points held by no-slip obstacles; arrays of length 0 if all obstacles are frictionless."""
 
     stuck: np.ndarray
     """Points that are held, (no, nf, nq) bool."""
     anchor: np.ndarray
-    """Where, from the obstacle's reference point, (no, nf, nq, 3) [m]."""
+    """Place at which each point is held, relative to the reference point of the obstacle, (no, nf, nq, 3) [m]."""
     traction: np.ndarray
     """Multiplier m_T, (no, nf, nq, 3) [Pa]."""
 
@@ -39,16 +40,16 @@ class Touch(NamedTuple):
     """State of all contacts: no obstacles."""
 
     rows: np.ndarray
-    """Obstacles where they are now, (no, 8)."""
+    """Obstacles at their current positions, (no, 8)."""
     shift: np.ndarray
-    """Further move to linearise, (no, 3) [m]; zero except in a predictor."""
+    """Further motion of the obstacles to be linearised, (no, 3) [m]; zero except in a predictor."""
     multiplier: np.ndarray
     """m at every point, (no, nf, nq) [Pa]."""
     penalty: np.ndarray
     """eps of each facet, (nf,) [Pa/m]."""
     grip: Grip
     guess: np.ndarray
-    """The pressures that the tangent counts with, (no, nf, nq) [Pa]; of length 0: t itself."""
+    """Pressures on which the tangent is based, (no, nf, nq) [Pa]; of length 0: those are t."""
     pressure: np.ndarray
     """t at every point, overwritten, (no, nf, nq) [Pa]."""
     traction: np.ndarray
@@ -114,7 +115,7 @@ def add_contact(x: np.ndarray, surface: Surface, touch: Touch, values: np.ndarra
 
 @compiled()
 def counted(touch: Touch, o: int, f: int):
-    """Whether a point of a facet has a multiplier, or a pressure that the tangent counts with."""
+    """Whether a point of a facet has a multiplier, or a pressure on which the tangent is based."""
     for q in range(touch.multiplier.shape[2]):
         if touch.multiplier[o, f, q] > 0.0 or (len(touch.guess) and touch.guess[o, f, q] > 0.0):
             return True
@@ -123,7 +124,7 @@ def counted(touch: Touch, o: int, f: int):
 
 @compiled()
 def out_of_reach(row: np.ndarray, nodes: np.ndarray):
-    """Whether no point of a facet without multipliers can feel an obstacle: farther than the facet extends.
+    """Whether a facet without multipliers is too far from an obstacle for any of its points to touch.
 
     The functions of a six-node triangle sum to 5/3 at most in absolute value, so its points stay within twice the
     distance of the nodes from their centre.
@@ -196,7 +197,7 @@ def first_grip(rows: np.ndarray, sticks: np.ndarray, surface: Surface, x: np.nda
 
 
 def renewed_grip(touch: Touch, sticks: np.ndarray, surface: Surface, x: np.ndarray) -> Grip:
-    """The grip after a load step: what is pressed stays stuck where it was, or sticks where it is now."""
+    """The grip after a load step: a pressed point that was stuck keeps its place, any other sticks where it is now."""
     old = touch.grip
     if not sticks.any():
         return old
@@ -207,7 +208,7 @@ def renewed_grip(touch: Touch, sticks: np.ndarray, surface: Surface, x: np.ndarr
 
 
 def potential(x: np.ndarray, surface: Surface, touch: Touch):
-    """sum w (t² - m² + T² - m_T²) / (2 eps) [J] in plain NumPy, apart from the kernel, to check it."""
+    """sum w (t² - m² + T² - m_T²) / (2 eps) [J] in plain NumPy, independent of the kernel, to check it."""
     y, total, eps = point_positions(x, surface), 0.0, touch.penalty[:, None]
     for o, (row, m) in enumerate(zip(touch.rows, touch.multiplier, strict=True)):
         t = np.maximum(0.0, m - eps * gaps(row, y))
@@ -239,16 +240,16 @@ def slippage(touch: Touch):
 
 
 def mistaken(touch: Touch):
-    """Whether a stuck point is held although nothing presses it, or pressed and not held: the guess was wrong."""
+    """Whether a point is held without contact pressure, or pressed but not held: the guess was then wrong."""
     if not (touch.grip.stuck.size and touch.guess.size):
         return False
     return bool(np.any(touch.grip.stuck & ((touch.guess > 0.0) != (touch.pressure > 0.0))))
 
 
 def misplacement(touch: Touch):
-    """Farthest from the surface of its obstacle, on either side, that a point feels a contact pressure [m].
+    """Largest distance from the surface of its obstacle, on either side, of a point with a contact pressure [m].
 
-    Too deep, or on its way out and still pushed by a multiplier from before.
+    Such a point is too deep, or it is moving out and still pushed by an earlier multiplier.
     """
     off = np.abs(touch.pressure - touch.multiplier) / touch.penalty[:, None]
     return float(np.max(off, initial=0.0, where=touch.pressure > 0.0))

@@ -1,9 +1,9 @@
 """Contact between the two faces of a cut, frictionless, at quadrature points (docs/theory.md, section 6).
 
-Both faces have the same triangulation, so that a point is known by its place in a facet and its copy. With y- behind
-the cut, y+ in front of it and n the normal of the surface half-way between the faces, the gap is g = n·(y+ - y-), and
-the pressure t = max(0, m - eps g) as for obstacles. n depends on both faces: the potential sum w (t² - m²) / (2 eps) is
-exact, so forces and moments of the two sides cancel, and the tangent is its second derivative.
+Both faces have the same triangulation, so that a point is given by its place in a facet and in the copy of this facet.
+With y- behind the cut, y+ in front of it and n the normal of the surface half-way between the faces, the gap is g =
+n·(y+ - y-), and the pressure t = max(0, m - eps g) as for obstacles. n depends on both faces: the potential sum w (t² -
+m²) / (2 eps) is exact, so forces and moments of the two sides cancel, and the tangent is its second derivative.
 """
 
 from typing import NamedTuple
@@ -17,11 +17,11 @@ from reference_fem.elements.surface import scatter
 from reference_fem.errors import SolveError
 
 SAME_POINT = 1e-9
-"""Two nodes closer than this fraction of the body are one at rest: far above rounding, far below an edge."""
+"""Fraction of the size of the body below which two nodes coincide at rest: far above round-off, far below an edge."""
 
 
 class Faces(NamedTuple):
-    """What the kernel reads of the faces of a cut: nf pairs of facets with six (or three) nodes, nq points each."""
+    """Tables of the faces of a cut for the kernel: nf pairs of facets with six (or three) nodes, nq points each."""
 
     dofs: np.ndarray
     """Unknowns of the nodes behind the cut (u_x first, then u_y, u_z), then of those in front, (nf, 36) uint32."""
@@ -47,14 +47,14 @@ class FaceTouch(NamedTuple):
     penalty: np.ndarray
     """eps of each pair of facets, (nf,) [Pa/m]."""
     guess: np.ndarray
-    """The pressures that the tangent counts with, (nf, nq) [Pa]; of length 0: t itself."""
+    """Pressures on which the tangent is based, (nf, nq) [Pa]; of length 0: those are t."""
     pressure: np.ndarray
     """t at every point, overwritten, (nf, nq) [Pa]."""
 
 
 def coincident(facets: Facets, x: np.ndarray) -> np.ndarray:
-    """Nodes of the facets that lie on each other at rest: behind a cut and in front of it, in the same order,
-    (nf, 2, 6). x: (N2, 3) [m]. Raises SolveError where there are none."""
+    """Nodes of the facets that coincide at rest: behind a cut and in front of it, in the same order,
+    (nf, 2, 6). x: (N2, 3) [m]. Raises SolveError if there are none."""
     size, table = float(np.ptp(x)), facets.nodes
     middle = x[table[:, :3]].mean(axis=1)
     pairs = KDTree(middle).query_pairs(SAME_POINT * size, output_type="ndarray")
@@ -200,8 +200,7 @@ def add_faces(x: np.ndarray, faces: Faces, touch: FaceTouch, values: np.ndarray,
                         K[r, c] += w * eps * d[r] * d[c]
                 add_curvature(faces, q, apart, B, n, g, size, -w * s, K)
         if tangent and touched:
-            # A node of the front of the cut is in both facets: of the symmetric pair that meets on the diagonal
-            # one is stored.
+            # A node of the front of the cut is in both facets: of its symmetric pair of entries only one is stored.
             for r in range(3 * count):
                 if faces.dofs[f, r] == faces.dofs[f, 3 * count + r]:
                     K[r, 3 * count + r] *= 2.0
@@ -227,7 +226,7 @@ def gaps_and_slopes(x: np.ndarray, faces: Faces) -> tuple[np.ndarray, np.ndarray
 
 
 def potential_of_faces(x: np.ndarray, faces: Faces, touch: FaceTouch) -> float:
-    """sum w (t² - m²) / (2 eps) [J] in plain NumPy, apart from the kernel, to check it."""
+    """sum w (t² - m²) / (2 eps) [J] in plain NumPy, independent of the kernel, to check it."""
     eps = touch.penalty[:, None]
     t = np.maximum(0.0, touch.multiplier - eps * gaps_and_slopes(x, faces)[0])
     return float(np.sum(faces.weights * (t**2 - touch.multiplier**2) / (2.0 * eps)))
@@ -248,7 +247,7 @@ def overlap(touch: FaceTouch) -> float:
 
 
 def farthest_slip(x: np.ndarray, faces: Faces, touch: FaceTouch) -> float:
-    """How far a point that is pressed has slipped over the other face, over the root of its facet's area [1]."""
+    """Largest slip of a pressed point over the other face, over the square root of the area of its facet [1]."""
     nodes = (faces.rest + x[: len(faces.rest)])[faces.dofs].reshape(len(faces.dofs), 2, 3, faces.values.shape[1])
     apart = np.einsum("qa,fia->fqi", faces.values, nodes[:, 1] - nodes[:, 0])
     square = np.sum(apart**2, axis=2) - gaps_and_slopes(x, faces)[0] ** 2
@@ -257,6 +256,6 @@ def farthest_slip(x: np.ndarray, faces: Faces, touch: FaceTouch) -> float:
 
 
 def misplacement_of_faces(touch: FaceTouch) -> float:
-    """Farthest from gap 0, on either side, that a point feels a pressure [m]."""
+    """Largest gap or overlap of a point with a contact pressure [m]."""
     off = np.abs(touch.pressure - touch.multiplier) / touch.penalty[:, None]
     return float(np.max(off, initial=0.0, where=touch.pressure > 0.0))

@@ -1,4 +1,4 @@
-"""A second opinion from NGSolve, where the extra `crosscheck` is installed; nothing else in the project needs it."""
+"""Independent solutions by NGSolve. They need the extra `crosscheck`; no other part of the project does."""
 
 from reference_fem.crosscheck.cases import clamped_ball, pulled_organ, thick_sphere
 from reference_fem.crosscheck.ngsolve_code import NgsolveSolution, available, solve

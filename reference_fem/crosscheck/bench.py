@@ -14,17 +14,17 @@ from reference_fem.system.saddle_point import System
 from reference_fem.system.state import NewtonSettings
 
 INVERSES = ("sparsecholesky", "umfpack")
-"""NGSolve's own direct solvers; with MKL's, where it has that, it took no less time."""
+"""The direct solvers of NGSolve. Its interface to MKL, if present, was not faster."""
 
 FIRST = 0.02
-"""Time of the state that both iterate at: deformed a little, as within a loading path."""
+"""Time of the state at which both codes iterate: slightly deformed, as within a loading path."""
 
 
 def iteration_ratio(n: int = 7, repeats: int = 3) -> dict:
     """Seconds of an iteration (tangent, residual, factors, solution), of reference_fem over the faster of NGSolve's.
 
-    By turns, least of the repeats after one that warms up. Keys: unknowns, own_s, ngsolve_s, ratio, inverse.
-    Raises SolveError where the extra is missing.
+    Both are measured in turn; each time is the least of the repeats after one warm-up. Keys: unknowns, own_s,
+    ngsolve_s, ratio, inverse. Raises SolveError where the extra is missing.
     """
     problem = clamped_ball(n)
     actions = {"own": own_iteration(problem)} | {name: ngsolve_iteration(problem, name) for name in INVERSES}
@@ -39,7 +39,8 @@ def iteration_ratio(n: int = 7, repeats: int = 3) -> dict:
 
 
 def own_iteration(problem: Problem) -> Callable[[], float]:
-    """An action that takes one iteration here and returns its seconds; it has been called once to warm up."""
+    """A function that makes one iteration of reference_fem and returns its time [s]; it has been called once to warm
+    up."""
     system = System(problem, NewtonSettings())
     state, target = system.rest(), system.held_at(FIRST)
     loads = system.loads_of(state)
@@ -56,7 +57,7 @@ def own_iteration(problem: Problem) -> Callable[[], float]:
 
 
 def ngsolve_iteration(problem: Problem, inverse: str) -> Callable[[], float]:
-    """The same in NGSolve's own Newton: two of its iterations, halved."""
+    """The same for the Newton solver of NGSolve: half the time of two iterations."""
     model = NgsolveModel(problem)
     model.advance(FIRST, inverse)
 

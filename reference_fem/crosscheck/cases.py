@@ -22,7 +22,8 @@ def straight(mesh: MeshTet) -> MeshTet:
 
 
 def facets_where(mesh: MeshTet, inside: Callable) -> Callable:
-    """What `where` asks, for the boundary facets all of whose vertices are `inside`: (3, n) points -> bool (n,)."""
+    """A function for `where` that selects the boundary facets all of whose vertices are `inside`: (3, n) points -> bool
+    (n,)."""
     table, x = facet_nodes(mesh), nodes(mesh)
     whole = np.asarray(inside(x.T), dtype=bool)[table[:, :3]].all(axis=1)
     if not whole.any():
@@ -33,7 +34,8 @@ def facets_where(mesh: MeshTet, inside: Callable) -> Callable:
 
 
 def clamped_ball(n: int = 4) -> Problem:
-    """A ball between clamped caps (those beyond 0.8 of the radius), one pushed in by 0.3 of the radius and aside."""
+    """A ball between clamped caps (those beyond 0.8 of the radius), one of which is pushed in by 0.3 of the radius and
+    sideways."""
     mesh = straight(whole_ball(n))
     top, bottom = (facets_where(mesh, lambda x, sign=sign: sign * x[2] > 0.8) for sign in (1.0, -1.0))
     push = PrescribedDisplacement(top, motion=lambda t: (0.1 * t, 0.0, -0.3 * t))

@@ -1,8 +1,9 @@
-"""A ball between planes or held at its caps, by a quarter of its meridian: NGSolve, third order, its own mesh.
+"""A ball between planes or held at its caps, reduced to a quarter of its meridian: NGSolve, third order, with a
+separate mesh.
 
 The ball is a body of revolution with a plane of symmetry: in cylindrical coordinates (r, z) the quarter disc r, z >= 0
-tells all. F = 1 + [[u_r,r, u_r,z, 0], [u_z,r, u_z,z, 0], [0, 0, u_r/r]], and an integral over the body is 2π ∫ r … of
-the quarter, twice. Elements shrink towards the cap's edge, where the stress is singular, and towards the pole.
+is sufficient. F = 1 + [[u_r,r, u_r,z, 0], [u_z,r, u_z,z, 0], [0, 0, u_r/r]], and an integral over the body is 2π ∫ r …
+of the quarter, twice. Elements shrink towards the cap's edge, where the stress is singular, and towards the pole.
 """
 
 from collections.abc import Sequence
@@ -17,23 +18,24 @@ from reference_fem.crosscheck.ngsolve_code import load
 from reference_fem.model.material import NeoHookean
 
 ORDER = 3
-"""Of the displacement; the pressure has one less."""
+"""Order of the displacement; that of the pressure is one less."""
 STIFF = 2e4
-"""Of the contact, over shear modulus and radius: a pressure of mu sinks in by 5e-5 of the radius."""
+"""Stiffness of contact times radius over shear modulus: under a pressure of mu a point penetrates by 5e-5 of the
+radius."""
 POLE = 0.85
-"""Height over the radius of the edge of the elements that are halved for a contact: where it ends at the most."""
+"""Height over the radius beyond which elements are halved for contact: the largest contact ends there."""
 AT = 1e-9
-"""Of the radius: a vertex so near the edge is the one at it."""
+"""Distance over the radius within which a vertex counts as that at the edge of the cap."""
 
 
 @dataclass(frozen=True)
 class MeridianMesh:
-    """How a quarter of the meridian is cut into triangles."""
+    """Settings for the triangulation of a quarter of the meridian."""
 
     size: float
-    """Of the elements, over the ball's radius."""
+    """Element size over the radius of the ball."""
     halvings: int
-    """Times that those at the edge of a cap are halved at their longest side."""
+    """How often elements at the edge of a cap are halved at their longest side."""
 
 
 @dataclass(frozen=True)
@@ -55,7 +57,7 @@ class MeridianSolution:
 
     radius: float
     force: np.ndarray
-    """Of the upper plane or cap on the ball, downwards, at each step (s,) [N]."""
+    """Force of the upper plane or cap on the ball, downwards, at each step (s,) [N]."""
     unknowns: int
     mesh: Any
     u: Any
@@ -64,7 +66,7 @@ class MeridianSolution:
     def displacement(self, points: np.ndarray) -> np.ndarray:
         """(n, 3) [m] at rest points (n, 3) [m] of the ball, about its centre: the equator moves in its plane only."""
         r, z = np.hypot(points[:, 0], points[:, 1]), np.abs(points[:, 2])
-        inward = 1.0 - 1e-6  # the curved mesh may end that much inside the sphere
+        inward = 1.0 - 1e-6  # the curved mesh may lie inside the sphere by so much
         moves = np.array([self.u(self.mesh(a * inward, b * inward)) for a, b in zip(r, z, strict=True)])
         outward = points[:, :2] / np.where(r > 0, r, 1.0)[:, None]
         return np.column_stack((outward * moves[:, :1], np.sign(points[:, 2]) * moves[:, 1]))
@@ -127,7 +129,7 @@ class Quarter:
         self.newton = Newton(self.form, self.state, self.space.FreeDofs())
 
     def plane_force(self) -> float:
-        """What the upper plane feels [N], upwards."""
+        """Force on the upper plane [N], upwards."""
         ng = load("ngsolve")
         into = ng.y + self.state.components[1] - self.plane
         density = 2.0 * np.pi * ng.x * ng.IfPos(into, self.stiffness * into, 0.0)
@@ -141,7 +143,7 @@ class Quarter:
         return field.vec.FV().NumPy().copy()
 
     def solution(self, radius: float, forces: list[float]) -> MeridianSolution:
-        """What is kept of the state that it has come to."""
+        """The result that is kept of the current state."""
         u = load("ngsolve").CF((self.state.components[0], self.state.components[1]))
         return MeridianSolution(radius, np.array(forces), self.space.ndof, self.mesh, u)
 

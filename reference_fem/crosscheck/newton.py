@@ -1,4 +1,5 @@
-"""Newton's method with a line search on an NGSolve form; NGSolve's own has none, which contact needs."""
+"""Newton's method with a line search on an NGSolve form. Contact needs the line search, which NGSolve's Newton solver
+lacks."""
 
 from typing import Any
 
@@ -10,7 +11,7 @@ TOLERANCE = 1e-9
 """Residual of the free unknowns over the forces on the held ones and on the obstacles."""
 MOST, HALVES = 40, 6
 INVERSE = "sparsecholesky"
-"""NGSolve's own factorisation of symmetric matrices, definite or not."""
+"""NGSolve's factorisation of symmetric matrices, definite or indefinite."""
 
 
 def free_size(residual: np.ndarray, free: np.ndarray) -> float:
@@ -40,7 +41,7 @@ class Newton:
         return (self.form.mat.Inverse(self.free, inverse=INVERSE) * right).Evaluate()
 
     def lift(self, increment: np.ndarray) -> None:
-        """The prescribed increment (all unknowns, 0 where free) and what the tangent says of the others."""
+        """The prescribed increment (all unknowns, 0 if free) plus the response of the free unknowns by the tangent."""
         vec = self.state.vec
         self.form.AssembleLinearization(vec)
         moved = vec.CreateVector()
@@ -50,9 +51,10 @@ class Newton:
         vec.data -= self.step(pulled)
 
     def converge(self, scale: float) -> int:
-        """Iterates until the free residual is TOLERANCE of `scale` [the residual's unit]; the iterations.
+        """Iterates until the free residual is TOLERANCE of `scale` [unit of the residual]; returns the number of
+        iterations.
 
-        Raises SolveError when MOST do not do it.
+        Raises SolveError if it takes more than MOST iterations.
         """
         size = free_size(self.residual(), self.chosen)
         for iteration in range(MOST):

@@ -1,7 +1,7 @@
-"""The same problem in NGSolve: its own P2/P1 spaces, its own derivatives of the energy, its own Newton.
+"""The same problem in NGSolve, with NGSolve's P2/P1 spaces, derivatives of the energy, and Newton solver.
 
 NGSolve (Schöberl 2014, C++11 implementation of finite elements in NGSolve) differentiates the energy symbolically;
-of this project it gets the mesh, the held values and the quadrature points, nothing else.
+it takes only the mesh, the held values and the quadrature points from this project.
 """
 
 import importlib
@@ -40,16 +40,16 @@ def load(name: str) -> Any:
 
 @dataclass(frozen=True, eq=False)
 class NgsolveSolution:
-    """What NGSolve found; nodes and vertices as in this project."""
+    """Solution by NGSolve, with nodes and vertices numbered as in this project."""
 
     u: np.ndarray
-    """(N2, 3) [m]."""
+    """Displacement of the P2 nodes, (N2, 3) [m]."""
     p: np.ndarray
-    """(N1,) [Pa]."""
+    """Pressure at the vertices, (N1,) [Pa]."""
     held_force: np.ndarray
     """Force of each held region on the body, (nh, 3) [N]; a shared unknown counts for the first region."""
     iterations: int
-    """Newton's, in all steps."""
+    """Newton iterations in all steps."""
 
 
 def to_ngsolve(mesh: MeshTet, boundaries: dict[str, np.ndarray] | None = None):
@@ -69,7 +69,7 @@ def to_ngsolve(mesh: MeshTet, boundaries: dict[str, np.ndarray] | None = None):
 
 
 def check(problem: Problem):
-    """Refuse what this translation does not cover."""
+    """Raises SolveError for problems that this translation does not cover."""
     extras = (problem.obstacles, problem.cavities, problem.loads, np.any(problem.gravity))
     if any(extras) or problem.element != "P2/P1" or not isinstance(problem.material, NeoHookean):
         raise SolveError("the cross-check covers neo-Hookean P2/P1 bodies with held regions and nothing else")
@@ -146,7 +146,7 @@ class NgsolveModel:
                 target[held.nodes, component] = values
         moved = (target - u).T
         ends, middles = moved[:, : mesh.nvertices], moved[:, mesh.nvertices :]
-        # an end that is free moves with the solution: its share is left to the solution as well
+        # a free end moves with the solution, so its share of the increment is left to the solution as well
         bulge = (middles - ends[:, mesh.edges].mean(axis=1)) / EDGE
         step = np.zeros(len(self.vector()))
         step[: moved.size] = np.hstack((ends, bulge[:, self.edges])).ravel()
@@ -164,14 +164,16 @@ class NgsolveModel:
         return self.newton(inverse, tolerance)
 
     def newton(self, inverse: str, tolerance: float, most: int = 20) -> int:
-        """NGSolve's own Newton from here; its iterations. Raises SolveError when it does not converge."""
+        """Runs NGSolve's Newton solver from the current state; returns the number of iterations. Raises SolveError when
+        it does not converge."""
         status, iterations = self.iterate(inverse, tolerance, most)
         if status != 0:
             raise SolveError(f"NGSolve's Newton did not converge in {most} iterations: take shorter steps")
         return iterations
 
     def iterate(self, inverse: str, tolerance: float, most: int):
-        """(status, iterations) of NGSolve's own Newton; what it prints is dropped: the status holds it."""
+        """(status, iterations) of NGSolve's Newton solver. Its printed output is discarded, since the status contains
+        it."""
         newton = load("ngsolve.solvers").Newton
         with redirect_stdout(StringIO()):
             return newton(

@@ -1,4 +1,4 @@
-"""The second opinion as oracles: NGSolve's answers beside those of reference_fem."""
+"""Oracles that compare the solutions of NGSolve and reference_fem."""
 
 from collections.abc import Callable
 from importlib.metadata import version
@@ -13,11 +13,11 @@ from reference_fem.statics.equilibrium import equilibrium_path
 from reference_fem.system.state import NewtonSettings
 
 CLOSE = NewtonSettings(force_tol=1e-10, volume_tol=1e-12)
-"""So that what differs is the codes, not where their iterations stop."""
+"""Tight tolerances, so that differences are due to the codes and not to where their iterations stop."""
 
 AGREEMENT = 1e-8
-"""Two codes with the same quadrature points solve the same equations: only Newton's tolerance, 1e-9, and round-off are
-left. Other points would move the force by 4e-6 to 6e-3."""
+"""Two codes with the same quadrature points solve the same equations: they differ only by Newton's tolerance, 1e-9, and
+round-off. Other points would change the force by 4e-6 to 6e-3."""
 
 
 def opinion(problem: Problem, what: str) -> tuple[Check, ...]:
@@ -44,7 +44,8 @@ def oracle(name: str, title: str, build: Callable[[], Problem], fast: bool = Fal
 
 
 def opinions(organ: Callable[[], Problem], cut: Callable[[], Problem]) -> tuple[Oracle, ...]:
-    """The four oracles; organ and cut build the problems of the last two, for such meshes are made elsewhere."""
+    """The four oracles; `organ` and `cut` build the problems of the last two, since this package cannot make their
+    meshes."""
     return (
         oracle("second_ball", "ball with clamped caps, second code", clamped_ball),
         oracle("second_sphere", "thick sphere, second code", thick_sphere),

@@ -1,8 +1,8 @@
-"""A held and pressed body in three dimensions: NGSolve, third order, on quadratic tetrahedra.
+"""A body in three dimensions with held regions and obstacles: NGSolve, third order, on quadratic tetrahedra.
 
 Frictionless obstacles push by a penalty, whose potential is ½ stiffness ∫ d² dA over the surface that is not held, d
-[m] the depth inside the obstacle. The load path is walked at second order; Newton's method at third order starts from
-its end, so the state at the end alone is of third order.
+[m] the depth inside the obstacle. The load path is computed at second order. Newton's method at third order starts from
+its end, so only the last state is of third order.
 """
 
 from collections.abc import Sequence
@@ -24,12 +24,12 @@ from reference_fem.model.obstacles import PLANE, Obstacle, RigidCapsule, finite_
 from reference_fem.model.problem import PrescribedDisplacement, Problem
 
 PATH_ORDER, ORDER = 2, 3
-"""Of the displacement on the way and at the end; the pressure has one less."""
+"""Orders of the displacement along the path and at its end; those of the pressure are one less."""
 STIFF = 1e4
-"""Of the contact, over shear modulus and size: a pressure of mu sinks in by 1e-4 of the size."""
+"""Stiffness of contact times size over shear modulus: under a pressure of mu a point penetrates by 1e-4 of the size."""
 EXTRA, CONTACT = 2, 14
-"""Orders of the quadrature: in the body beyond twice that of the displacement; on the surface, for contact ends inside
-facets."""
+"""Orders of quadrature. EXTRA: in the body, beyond twice that of the displacement. CONTACT: on the surface, high
+because contact ends inside facets."""
 FREE = "free"
 """Name of the surface that is not held."""
 
@@ -39,9 +39,9 @@ class SolidSolution:
     """The end of a path."""
 
     obstacle_force: np.ndarray
-    """Of each obstacle on the body, (no, 3) [N]."""
+    """Force of each obstacle on the body, (no, 3) [N]."""
     held_force: np.ndarray
-    """Of each held region on the body, (nh, 3) [N]."""
+    """Force of each held region on the body, (nh, 3) [N]."""
     unknowns: int
     problem: Problem
     mesh: Any
@@ -72,7 +72,7 @@ class SolidSolution:
         return moves
 
     def _evaluator(self, chosen: np.ndarray) -> Evaluator:
-        """Of the chosen elements, numbered as they are chosen."""
+        """The evaluator on the chosen elements, numbered in their order."""
         evaluator = Evaluator(self.problem.mesh)
         evaluator.table, evaluator.corners = evaluator.table[chosen], evaluator.corners[chosen]
         evaluator.tree = KDTree(evaluator.corners.mean(axis=1))
@@ -80,7 +80,7 @@ class SolidSolution:
 
 
 def check_solid(problem: Problem) -> None:
-    """Refuse what is not translated, and elements that fold. Raises SolveError."""
+    """Raises SolveError for problems that are not covered, and for elements that fold."""
     extras = (problem.cavities, problem.loads, np.any(problem.gravity))
     partly = any(held.shape is not None or set(held.components) != {0, 1, 2} for held in problem.held)
     other = any(isinstance(o, RigidCapsule) or o.slip != "frictionless" for o in problem.obstacles)
@@ -109,7 +109,8 @@ def boundaries(problem: Problem) -> dict[str, np.ndarray]:
 
 
 def curved_body(mesh: MeshTet, facets: dict[str, np.ndarray]) -> tuple[Any, Any]:
-    """NGSolve's mesh with boundaries, and how far its points are off the straight elements: as the mesh is curved."""
+    """NGSolve's mesh with boundaries, and the field by which its points deviate from straight elements, as in the
+    curved `mesh`."""
     ng, body = load("ngsolve"), to_ngsolve(mesh, facets)
     bend = ng.GridFunction(ng.VectorH1(body, order=2))
     ours = edge_index(mesh, np.array([[vertex.nr for vertex in edge.vertices] for edge in body.edges]))
@@ -179,13 +180,13 @@ class Solid:
                 parameter.Set(float(value))
 
     def obstacle_force(self, number: int) -> np.ndarray:
-        """Of an obstacle on the body, (3,) [N]."""
+        """Force of an obstacle on the body, (3,) [N]."""
         ng = load("ngsolve")
         depth, normal = self.depth(number, self.state.components[0])
         return np.array([ng.Integrate(self.stiffness * depth * part * self.outside, self.mesh) for part in normal])
 
     def held_force(self, number: int) -> np.ndarray:
-        """Of a held region on the body, (3,) [N]."""
+        """Force of a held region on the body, (3,) [N]."""
         residual = self.newton.residual()
         return np.array([self.moved(number, axis) @ residual for axis in np.eye(3)])
 
@@ -196,7 +197,8 @@ def motion(moving: PrescribedDisplacement | Obstacle, t: float) -> np.ndarray:
 
 
 def solve_solid(problem: Problem, times: Sequence[float], stiff: float = STIFF) -> SolidSolution:
-    """The state at the last of the times [s], reached from rest; stiff: of the contact, over shear modulus and size.
+    """The state at the last of the times [s], reached from rest; stiff: stiffness of contact times size over shear
+    modulus.
 
     Raises SolveError for a problem that is not covered, elements that fold, and steps that are too long.
     """

@@ -3,8 +3,8 @@
 Arnold and Brüls, Convergence of the generalized-alpha scheme for constrained mechanical systems, Multibody System
 Dynamics 18, 2007, with the parameters of Chung and Hulbert, Journal of Applied Mechanics 60, 1993. The momentum
 balance M a + c M v + f(u, p) = load, the pressure's constraint and contact all hold exactly at the end of the step;
-only the auxiliary acceleration that feeds Newmark's formulas is averaged (docs/theory.md, eqs. 6.9 and 6.10). Averaging
-the pressure as well would carry its error from step to step, for a multiplier has no memory to damp it with.
+only the auxiliary acceleration that feeds Newmark's formulas is averaged (docs/theory.md, eqs. 6.9 and 6.10). If the
+pressure were averaged too, its error would persist from step to step, since nothing damps a multiplier.
 """
 
 from dataclasses import dataclass
@@ -20,7 +20,8 @@ from reference_fem.system.state import Loads, NewtonSettings, State
 
 
 class Scheme(NamedTuple):
-    """Parameters of generalised-alpha; second order for every rho_inf, which damps what the step cannot resolve."""
+    """Parameters of generalised-alpha; second order for every rho_inf, which sets the damping of frequencies that the
+    step cannot resolve."""
 
     alpha_m: float
     alpha_f: float
@@ -56,7 +57,8 @@ class TimeStep:
     dt: float
     scheme: Scheme
     held: np.ndarray
-    """Unknowns whose motion is prescribed: they follow it exactly, Newmark's formulas would ring after a kink."""
+    """Unknowns whose motion is prescribed. They follow it exactly: by Newmark's formulas they would oscillate after a
+    kink."""
     held_v: np.ndarray
     held_a: np.ndarray
 
@@ -79,12 +81,12 @@ class TimeStep:
 
 @dataclass
 class Instant:
-    """A motion as it is, where a TimeStep would ask for its end."""
+    """A given instant of a motion, in place of a TimeStep."""
 
     motion: Motion
 
     def at(self, _: np.ndarray):
-        """(v, a, memory): given, whatever the displacement."""
+        """(v, a, memory) of the instant, independent of the displacement."""
         return self.motion.v, self.motion.a, self.motion.memory
 
     def slopes(self):
@@ -107,10 +109,10 @@ class MovingSystem(System):
         self.clock: TimeStep | Instant | None = None
 
     def check_freedom(self, held_dofs: np.ndarray):
-        """Nothing to refuse: inertia balances what no holder does."""
+        """Accepts any holders: inertia balances forces that no holder does."""
 
     def evaluate(self, x: np.ndarray, loads: Loads, tangent: bool = True) -> Evaluation:
-        """As at rest, with inertia, once there is a clock."""
+        """As System.evaluate, with inertia if there is a clock."""
         evaluation = super().evaluate(x, loads, tangent)
         if self.clock is None:
             return evaluation
@@ -132,7 +134,7 @@ class MovingSystem(System):
     def force_error(self, evaluation: Evaluation, inertia: np.ndarray, v: np.ndarray, force: np.ndarray | float):
         """Unbalanced force over the forces at work.
 
-        Where nothing acts, as in free flight, the scale is the force of elasticity that would stop the motion.
+        If no force acts, as in free flight, the scale is the elastic force that would stop the motion.
         """
         free = self.pattern.free[self.pattern.free < self.displacement_count]
         mu, size = self.problem.material.mu, self.volume ** (1.0 / 3.0)

@@ -1,4 +1,4 @@
-"""Step by step through time: steps that fail are halved and grow again; the energy is accounted for.
+"""Time integration: failed steps are halved and steps then grow again; an account of the energy is kept.
 
 docs/theory.md, eq. 6.12.
 """
@@ -18,7 +18,7 @@ from reference_fem.system.state import State
 
 
 class Powers(NamedTuple):
-    """What enters the energy account at one instant."""
+    """The quantities of the energy account at one instant."""
 
     force: np.ndarray
     """Dead loads and weight, (field_count,) [N]."""
@@ -29,9 +29,9 @@ class Powers(NamedTuple):
     reaction: np.ndarray
     """Forces of the holders, one for each held unknown [N]."""
     pressures: np.ndarray
-    """In the cavities, (nc,) [Pa]."""
+    """Pressures in the cavities, (nc,) [Pa]."""
     volumes: np.ndarray
-    """Of the cavities, (nc,) [m³]."""
+    """Volumes of the cavities, (nc,) [m³]."""
     dissipation: float
     """c v·M v [W]."""
 
@@ -55,7 +55,7 @@ class Account:
         return Powers(np.asarray(loads.force), rows, push, reaction, pressures, evaluation.volumes, dissipation)
 
     def book(self, old: Motion, new: Motion):
-        """The step from old to new."""
+        """Adds the step from `old` to `new`."""
         system, before, now = self.system, self.now, self.powers(new)
         moved = new.state.x - old.state.x
         n, held = system.displacement_count, system.pattern.held
@@ -78,14 +78,14 @@ def strain(system: MovingSystem, state: State):
 
 
 class March:
-    """A motion under way."""
+    """A motion during its integration."""
 
     def __init__(self, system: MovingSystem, scheme: Scheme, dt: float | None = None):
         self.system, self.scheme, self.dt = system, scheme, dt
         self.iterations = self.substeps = 0
 
     def begin(self, state: State, v: np.ndarray, interval: float):
-        """Let go of a body in `state` with velocities v; interval [s]: to the first wanted time."""
+        """Releases a body in `state` with velocities v; interval [s]: time to the first wanted time."""
         system = self.system
         self.motion = released(system, state, v, interval / self.count(interval))
         system.clock = Instant(self.motion)
@@ -102,7 +102,7 @@ class March:
         t0, reached = self.motion.state.t, 0.0
         share = full = 1.0 / self.count(t - t0)
         while reached < 1.0:
-            # no step of its own for a remainder that is round-off
+            # no separate step for a remainder that is round-off
             goal = 1.0 if reached + 1.001 * share > 1.0 else reached + share
             try:
                 self.step(t if goal == 1.0 else t0 + goal * (t - t0))
@@ -116,7 +116,7 @@ class March:
                 share = min(full, 2.0 * share)
 
     def step(self, t: float):
-        """One step, to time t; a StepFailed leaves the motion as it was."""
+        """One step, to time t; after StepFailed the motion is unchanged."""
         system, old = self.system, self.motion
         dt = t - old.state.t
         system.clock = TimeStep(old, dt, self.scheme, system.pattern.held, *held_motion(system, t, dt))
@@ -127,7 +127,7 @@ class March:
         self.iterations, self.substeps = self.iterations + state.iterations, self.substeps + 1
 
     def stuck(self, t: float, failure: Exception, path: Sequence[Equilibrium]):
-        """The error of a march that no shorter step carries on."""
+        """The exception for a motion that even the shortest step cannot continue."""
         return SolveError(
             f"no motion found between t = {self.motion.state.t:g} s (the last that converged) and t = {t:g} s: "
             f"{failure}; refine the mesh where it folds, or ask for less",

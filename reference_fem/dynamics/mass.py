@@ -13,7 +13,7 @@ from reference_fem.system.saddle_point import System
 
 
 class Mass(NamedTuple):
-    """The same mass twice: for forces, and where the tangent wants it."""
+    """The mass in two forms: as a matrix for forces, and in the pattern of the tangent."""
 
     matrix: sp.csr_matrix
     """One component, between the displacement functions (the P2 nodes), (N2, N2) [kg]."""
@@ -38,7 +38,7 @@ def build_mass(system: System) -> Mass:
     count, width = len(system.nodes), len(elements.sizes.functions)
     table = elements.dofs[:, :width].astype(np.int64) // 3
     for hung in problem.masses:
-        # As a part of one element around the node, so that both forms have it.
+        # Added to one element around the node, so that both forms contain it.
         element, place = np.argwhere(table == hung.node)[0]
         local[element, place, place] += hung.mass
     rows, cols = np.repeat(table, width, axis=1).ravel(), np.tile(table, (1, width)).ravel()

@@ -16,7 +16,7 @@ from reference_fem.system.state import Loads, NewtonSettings
 
 @dataclass(frozen=True, eq=False)
 class Modes:
-    """The lowest modes, by frequency; the `rigid` motions that nothing holds come first, at (almost) zero."""
+    """The lowest modes, ordered by frequency. The `rigid` motions that are not held come first, at (almost) zero."""
 
     omega: np.ndarray
     """Circular frequencies, (rigid + count,) [rad/s]."""
@@ -41,8 +41,8 @@ def natural_frequencies(problem: Problem, count: int, solver: str = "auto") -> M
 
     K z = omega² diag(M, 0) z with the tangent K of P2/P1 at rest and the consistent mass M; the pressure has no
     inertia. Shift-invert Lanczos (Lehoucq, Sorensen, Yang, ARPACK Users' Guide, 1998) on the displacement alone: the
-    pressure is eliminated by every solve. Prescribed displacements are held at zero; obstacles and loads play no part,
-    and a lumen is empty. Raises SolveError for a body without mass and for a count that the mesh cannot give.
+    pressure is eliminated by every solve. Prescribed displacements are held at zero; obstacles and loads are ignored,
+    and lumens are empty. Raises SolveError for a body without mass and for a count that the mesh cannot give.
     """
     system = MovingSystem(replace(problem, obstacles=(), cavities=()), NewtonSettings(solver=solver))
     pattern, n = system.pattern, system.displacement_count
@@ -66,7 +66,8 @@ def lowest(system: MovingSystem, free: np.ndarray, count: int):
     problem, mass = system.problem, system.mass
     rest = system.rest()
     tangent = system.evaluate(rest.x, Loads(0.0, system.rows, rest.multiplier)).values
-    # below zero, so that a free body can be factorised; about the softest elastic omega² of a compact body
+    # a negative shift, so that a free body can be factorised; its size is about the lowest elastic omega² of a compact
+    # body
     shift = -problem.material.mu / (problem.density * system.volume ** (2.0 / 3.0))
     system.solver.factor(system.pattern.upper(tangent - shift * mass.values))
     unknowns, displacements = len(system.pattern.free), len(free)

@@ -19,12 +19,12 @@ from reference_fem.system.state import NewtonSettings
 
 @dataclass(frozen=True)
 class DynamicsSettings:
-    """How time advances; the start of time and the effort of a step are Newton's settings.
+    """Settings of the time integration; the start time and the tolerances of a step are in NewtonSettings.
 
     dt: largest step [s], None = the intervals between the wanted times. damping: c [1/s] of the force -c M v, as the
-    mass-spring body has it. rho_inf: what a step leaves of an oscillation that it cannot resolve, 0 to 1; take 0.5 for
-    an impact, where 0.9 lets the few nodes in contact chatter.
-    Raises SolveError for values out of range.
+    mass-spring body has it. rho_inf: factor per step on the amplitude of an oscillation that the step cannot resolve, 0
+    to 1. Take 0.5 for an impact: with 0.9 the few nodes in contact oscillate. Raises SolveError for values out of
+    range.
     """
 
     dt: float | None = None
@@ -43,7 +43,7 @@ class DynamicsSettings:
 
 @dataclass(frozen=True, eq=False)
 class Moment(Equilibrium):
-    """One instant of a motion: all that an Equilibrium tells, inertia included in the reactions, and the energies."""
+    """One instant of a motion: the fields of an Equilibrium, with inertia in the reactions, and the energies."""
 
     v: np.ndarray
     """Velocity of the P2 nodes, (N2, 3) [m/s]."""
@@ -52,11 +52,12 @@ class Moment(Equilibrium):
     kinetic: float
     """Kinetic energy [J]; `energy` is the strain energy."""
     damped: float
-    """Energy that damping took since the start [J]."""
+    """Energy dissipated by damping since the start [J]."""
     work: float
     """Work of loads, obstacles, holders and cavities on the body since the start [J]."""
     balance: float
-    """Kinetic and strain energy, less those at the start, plus damped, less work [J]: gained by the scheme itself."""
+    """Kinetic and strain energy, less those at the start, plus damped, less work [J]: the energy error of the
+    scheme."""
 
 
 def motion_path(
@@ -69,9 +70,9 @@ def motion_path(
 ) -> list[Moment]:
     """The motion at the given times [s], from velocity0 (3,) or (N2, 3) [m/s] or from rest; on_step sees each moment.
 
-    start: an Equilibrium on the same mesh, whose displacement the body is let go from; None = undeformed. All of
-    `problem` acts from the start on, gravity too. Raises SolveError for what cannot be set up, and when a
-    step shorter than newton.smallest_step of the ordinary one still fails: its `converged` holds what was reached.
+    start: an Equilibrium on the same mesh, from whose displacement the body is released; None = undeformed. All loads
+    of `problem` act from the start, including gravity. Raises SolveError for a problem that cannot be set up, and when
+    a step shorter than newton.smallest_step of the ordinary one still fails: its `converged` holds what was reached.
     """
     settings = settings or DynamicsSettings()
     begin = settings.newton.start
@@ -121,7 +122,7 @@ def given_start(system: MovingSystem, velocity0: ArrayLike | None, start: Equili
 
 
 def moment(system: MovingSystem, march: March) -> Moment:
-    """Everything worth knowing about where the march is."""
+    """The Moment at which the march is."""
     motion, account = march.motion, march.account
     seen = describe(system, motion.state, march.iterations, march.substeps)
     march.iterations = march.substeps = 0

@@ -1,4 +1,4 @@
-"""The start of a motion: the accelerations that go with a displacement and a velocity (docs/theory.md, eq. 6.11)."""
+"""The start of a motion: accelerations consistent with a displacement and a velocity (docs/theory.md, eq. 6.11)."""
 
 from dataclasses import replace
 

@@ -19,9 +19,9 @@ FACET_EDGES = ((0, 1), (1, 2), (0, 2))
 
 
 class Sizes(NamedTuple):
-    """Lengths as tuples of zeros: the compiler knows a tuple's length, not an array's, and unrolls its loops by it.
+    """Lengths as tuples of zeros: the compiler knows the length of a tuple, not that of an array, and can unroll loops.
 
-    Handed to inner functions one by one: all three together cost a fifth of the assembly's speed.
+    Pass them to inner functions one by one: all three together slow the assembly by a fifth.
     """
 
     functions: tuple
@@ -33,7 +33,7 @@ class Sizes(NamedTuple):
 
 
 class Elements(NamedTuple):
-    """Everything the element kernel reads, for `ne` elements and `nq` quadrature points each.
+    """Tables for the element kernel: `ne` elements with `nq` quadrature points each.
 
     A local vector has u_x at the `nu` functions, then u_y, u_z, then p at the `np` functions.
     """
@@ -143,7 +143,7 @@ def build_elements(mesh: MeshTet, order: int, element: Element = ELEMENTS[DEFAUL
 
 
 def check_shapes(det: np.ndarray):
-    """Refuse elements whose map folds: the sign of det (ne, nq) must not change inside one element."""
+    """Raises SolveError for elements whose map folds: the sign of det (ne, nq) must not change inside one element."""
     largest = np.abs(det).max(axis=1)
     folded = det.min(axis=1) * det.max(axis=1) <= 0.0
     # 1e-10 of the typical size is far below what a meshing tool leaves and far above round-off
@@ -157,14 +157,16 @@ def check_shapes(det: np.ndarray):
 
 
 OUTWARD = np.array([-1, 1, -1, 1])
-"""Whether the faces of an upright tetrahedron, as RefTet lists their vertices, turn counterclockwise from outside."""
+"""+1 for faces of a positive tetrahedron whose vertices, in the order of RefTet, are counterclockwise from outside,
+else -1."""
 
 
 def check_neighbours(mesh: MeshTet):
-    """Refuse a folded element, and an inside-out one: two tetrahedra turn round the face between them in opposite ways.
+    """Raises SolveError for folded or inverted elements: neighbours must pass round their common face in opposite
+    senses.
 
-    The map of an element says how it turns, not its corners: those of a part of a curved element that was halved may
-    lie the other way round, though it is upright everywhere.
+    The orientation is that of the map of an element, not of its corners: a part of a halved curved element may have
+    inverted corners although its map is positive everywhere.
     """
     _, shape = basis_table(ElementTetP2(), get_quadrature(RefTet, ELEMENTS[DEFAULT].order)[0])
     det = np.linalg.det(np.einsum("eni,qJn->eqiJ", nodes(mesh)[element_nodes(mesh)], shape))

@@ -1,4 +1,4 @@
-"""The boundary as the kernels read it, and how small matrices of its facets go into the tangent."""
+"""Tables of the boundary for the kernels, and the assembly of facet matrices into the tangent."""
 
 from typing import NamedTuple
 
@@ -8,7 +8,7 @@ from reference_fem.compiled import compiled
 
 
 class Surface(NamedTuple):
-    """What the contact kernel reads of the boundary: nf facets, nq points each."""
+    """Tables of the boundary for the contact kernel: nf facets, nq points each."""
 
     dofs: np.ndarray
     """Unknowns of the six nodes (three, for linear elements), u_x first, then u_y, u_z, (nf, 18) uint32."""
@@ -25,7 +25,7 @@ class Surface(NamedTuple):
 
 
 def point_positions(x: np.ndarray, surface: Surface):
-    """Where the contact points are, (nf, nq, 3) [m]."""
+    """Positions of the contact points, (nf, nq, 3) [m]."""
     moved = (surface.rest + x[: len(surface.rest)])[surface.dofs].reshape(len(surface.dofs), 3, -1)
     return np.einsum("qa,fia->fqi", surface.values, moved)
 

@@ -1,4 +1,4 @@
-"""The elements to choose from, each with what it promises."""
+"""The available elements, each with its claims."""
 
 from dataclasses import dataclass
 
@@ -19,9 +19,9 @@ class Element:
     order: int
     """Lowest quadrature order with positive weights that keeps the rates."""
     rates: tuple[float, float]
-    """Least orders of the L2 errors of displacement and pressure in the mesh size, at kappa/mu = 1000."""
+    """Lower bounds on the orders of the L2 errors of displacement and pressure in the mesh size, at kappa/mu = 1000."""
     locks: bool
-    """Whether it turns far too stiff as kappa/mu grows."""
+    """Whether it becomes far too stiff as kappa/mu grows (locking)."""
     source: str
 
     @property

@@ -1,1 +1,1 @@
-"""What is solved: material, loads, obstacles, cavities, the problem as a whole."""
+"""The problem to be solved: material, loads, obstacles, cavities."""

@@ -22,11 +22,11 @@ from reference_fem.errors import SolveError
 
 @dataclass(frozen=True, eq=False)
 class Cavity:
-    """A lumen enclosed by the tissue. A lumen that is open to the outside is simply not listed.
+    """A lumen enclosed by the tissue. A lumen that is open to the outside is not a cavity.
 
     where: (3, N) rest centroids of boundary facets -> bool (N,): the wall of the lumen. volume: t [s] -> filling
     V/V0, None = 1 (incompressible content). pressure: t [s] -> gauge pressure in the lumen [Pa], instead of a volume.
-    What does not vanish at the start is switched on there first, together with gravity. The wall may end on symmetry
+    Values that are not zero at the start are applied there first, together with gravity. The wall may end on symmetry
     planes: coordinate planes whose component is held at zero along the whole edge.
     """
 
@@ -35,7 +35,7 @@ class Cavity:
     pressure: Callable | None = None
 
     def target(self, t: float, number: int):
-        """Wanted filling V/V0, or wanted pressure [Pa], at time t."""
+        """Target of the filling V/V0, or of the pressure [Pa], at time t."""
         given = self.volume if self.pressure is None else self.pressure
         value = float(1.0 if given is None else given(t))
         if not np.isfinite(value) or (self.pressure is None and value <= 0.0):
@@ -45,7 +45,7 @@ class Cavity:
 
 
 class Wall(NamedTuple):
-    """What the kernel reads of a cavity's wall: nf facets of nn nodes."""
+    """Tables of the wall of a cavity for the kernel: nf facets of nn nodes."""
 
     dofs: np.ndarray
     """Unknowns of the nodes, u_x first, then u_y, u_z, (nf, 3 nn) uint32."""
@@ -69,7 +69,7 @@ class Lumen:
     cavity: Cavity = field(repr=False)
     number: int = 0
     normals: np.ndarray | None = None
-    """N_abc: integral of phi_a n dA over a facet = sum of N_abc y_b × y_c, (nn, nn, nn); None of a closed wall."""
+    """N_abc: integral of phi_a n dA over a facet = sum of N_abc y_b × y_c, (nn, nn, nn); None for a closed wall."""
 
     @property
     def by_pressure(self):
@@ -77,7 +77,7 @@ class Lumen:
         return self.cavity.pressure is not None
 
     def target(self, t: float, load: float):
-        """Wanted volume [m³] or pressure [Pa] at time t, when a share `load` of the start values acts."""
+        """Target volume [m³] or pressure [Pa] at time t, with a share `load` of the start values."""
         value = self.cavity.target(t, self.number)
         return load * value if self.by_pressure else (1.0 + load * (value - 1.0)) * self.volume0
 
@@ -86,10 +86,10 @@ class Lumen:
         return add_wall(x, self.wall, pressure, gradient, values, tangent)
 
     def beyond_pressure(self, x: np.ndarray):
-        """What dV/dx has on held unknowns beside the wall's area times its normal, of the shape of x [m²].
+        """The part of dV/dx on held unknowns that is not area times normal of the wall, in the shape of x [m²].
 
-        The volume is that of a cone. Where its wall ends on a symmetry plane, the cone grows with the edge when that
-        leaves the plane, which the content cannot feel: it presses on the wall alone.
+        The volume is computed as that of a cone over the wall. If the edge of the wall moved off its symmetry plane,
+        the cone would grow, but the content would do no work on it: its pressure acts only on the wall.
         """
         beyond = np.zeros(len(x))
         if self.normals is None:
@@ -156,7 +156,8 @@ def add_wall(x: np.ndarray, wall: Wall, pressure: float, gradient: np.ndarray, v
 def find_lumens(problem: Any, pattern: Any, element: Any, table: np.ndarray, held: Sequence[Any]) -> list[Lumen]:
     """The cavities of a problem on its mesh; table: facet nodes of the element (nf, nn), held: HeldNodes.
 
-    Raises SolveError for a wall that finds no facet, shares one, is open, or encloses a negative volume.
+    Raises SolveError for a wall that has no facet, shares one with another wall, is open, or encloses a negative
+    volume.
     """
     x, lumens = nodes(problem.mesh), []
     corners = facet_nodes(problem.mesh)[:, :3]
@@ -204,8 +205,8 @@ def build_wall(problem: Any, pattern: Any, element: Any, table: np.ndarray, orig
 
 
 def wall_origin(number: int, corners: np.ndarray, x: np.ndarray, held: Sequence[Any]):
-    """A point that all symmetry planes which close the wall go through, (3,) [m], the centre where none does; and
-    whether any does."""
+    """(point (3,) [m] on all symmetry planes that close the wall, the centre of the wall if there are none; whether
+    there are any)."""
     edges = np.sort(np.concatenate((corners[:, :2], corners[:, 1:], corners[:, ::2])), axis=1)
     edges, count = np.unique(edges, axis=0, return_counts=True)
     border = edges[count == 1]

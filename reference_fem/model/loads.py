@@ -1,4 +1,4 @@
-"""Dead loads: forces given per rest area or rest volume, whatever the body does."""
+"""Dead loads: forces per rest area or rest volume, which do not change as the body deforms."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -43,7 +43,7 @@ class BodyForce:
 
 @dataclass(frozen=True)
 class PointMass:
-    """What hangs at a node of the P2 mesh: gravity pulls it, and in a motion it is inert."""
+    """A point mass at a node of the P2 mesh, with weight and, in a motion, inertia."""
 
     node: int
     """Row of `reference_fem.nodes(mesh)`."""

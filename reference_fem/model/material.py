@@ -23,7 +23,7 @@ def check_modulus(name: str, value: float):
 
 
 class TwoTermLaw(ABC):
-    """What every material here shares: all that follows from its `parameters`."""
+    """Base class of all materials: everything that follows from `parameters`."""
 
     mu: float
     """Shear modulus at rest [Pa]."""
@@ -33,10 +33,10 @@ class TwoTermLaw(ABC):
     @property
     @abstractmethod
     def parameters(self) -> np.ndarray:
-        """What the compiled law reads: (2 c1, 2 c2, kappa) [Pa]."""
+        """Parameters of the compiled law: (2 c1, 2 c2, kappa) [Pa]."""
 
     def energy_density(self, F: np.ndarray, p: np.ndarray):
-        """W [J/m³] for F (..., 3, 3) and p (...) [Pa]; written apart from the kernel, to check it."""
+        """W [J/m³] for F (..., 3, 3) and p (...) [Pa]; independent of the kernel, to check it."""
         m1, m2, kappa = self.parameters
         J, C = np.linalg.det(F), np.swapaxes(F, -1, -2) @ F
         I1 = np.trace(C, axis1=-2, axis2=-1)
@@ -47,7 +47,7 @@ class TwoTermLaw(ABC):
     def stress(self, F: np.ndarray, p: np.ndarray):
         """First Piola-Kirchhoff stress P (..., 3, 3) [Pa], P Fᵀ = dev(m1 b + m2 (I1 b - b²)) + J p.
 
-        m1, m2 = 2 c1 J^-2/3, 2 c2 J^-4/3, b = F Fᵀ; written apart from the kernel, to check it.
+        m1, m2 = 2 c1 J^-2/3, 2 c2 J^-4/3, b = F Fᵀ; independent of the kernel, to check it.
         """
         J = np.linalg.det(F)[..., None, None]
         b, one = F @ np.swapaxes(F, -1, -2), np.eye(3)

@@ -32,7 +32,7 @@ def positive_radius(value: float, name: str):
 class RigidPlane:
     """The body stays in normal·(x - point - motion(t)) >= 0.
 
-    motion: t [s] -> displacement (3,) [m], None = rests. slip: "frictionless", or "no_slip": what touches sticks.
+    motion: t [s] -> displacement (3,) [m], None = at rest. slip: "frictionless", or "no_slip": touching points stick.
     """
 
     point: tuple
@@ -86,7 +86,7 @@ Obstacle = RigidPlane | RigidSphere | RigidCapsule
 
 
 def sticky(obstacles: Sequence[Obstacle]):
-    """Which obstacles hold what touches them, (no,) bool; raises SolveError for an unknown slip."""
+    """Which obstacles are no-slip, (no,) bool; raises SolveError for an unknown slip."""
     for k, obstacle in enumerate(obstacles):
         if obstacle.slip not in SLIP:
             raise SolveError(f"obstacle {k} has slip {obstacle.slip!r}: choose one of {', '.join(SLIP)}")
@@ -106,7 +106,8 @@ def place(rows: np.ndarray, obstacles: Sequence[Obstacle], t: float):
 def gap_into(row: np.ndarray, y: np.ndarray, n: np.ndarray, along: np.ndarray):
     """Gap g [m] between point y and an obstacle; unit normal n towards the body, curvature of g [1/m].
 
-    d²g/dy² = curvature (1 - n⊗n - along⊗along): along (3,) is the axis of a capsule beside its straight part, else 0.
+    d²g/dy² = curvature (1 - n⊗n - along⊗along): along (3,) is the axis of a capsule for points next to its cylindrical
+    part, else 0.
     """
     g, share, squared = 0.0, 0.0, 0.0
     for i in range(3):
@@ -134,7 +135,7 @@ def gap_into(row: np.ndarray, y: np.ndarray, n: np.ndarray, along: np.ndarray):
 
 
 def gaps(row: np.ndarray, y: np.ndarray):
-    """Gap of points y (..., 3) [m] in plain NumPy, apart from the kernel, to check it."""
+    """Gap of points y (..., 3) [m] in plain NumPy, independent of the kernel, to check it."""
     apart = y - row[1:4]
     if row[0] == PLANE:
         return apart @ row[4:7]

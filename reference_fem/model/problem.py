@@ -1,4 +1,4 @@
-"""What is solved: a body, its material, what holds it and what presses it."""
+"""The problem to be solved: a body, its material, its supports, its loads and obstacles."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -19,8 +19,8 @@ from reference_fem.model.obstacles import Obstacle, finite_vector
 class PrescribedDisplacement:
     """Displacement components prescribed at boundary nodes.
 
-    where: (3, N) rest positions -> bool (N,), asked at the nodes of the boundary.
-    motion: t [s] -> (3,) displacement [m], None = stays. shape: (3, N) rest positions -> (3, N) factors that the
+    where: (3, N) rest positions -> bool (N,), evaluated at the nodes of the boundary.
+    motion: t [s] -> (3,) displacement [m], None = fixed. shape: (3, N) rest positions -> (3, N) factors that the
     displacement is multiplied with, component by component, None = 1 (for radial or affine motions).
     """
 
@@ -36,10 +36,10 @@ class Problem:
 
     mesh: MeshTet (straight) or MeshTet2 (curved, see curve). gravity [m/s²], density [kg/m³].
     cavities: lumens that keep a volume or a pressure; a lumen not named is open. element: a name in ELEMENTS.
-    order: degree integrated exactly, None = the element's own (for P2/P1 that is 5, the lowest with positive weights at
-    or above what p J needs, 4). loads: dead forces, switched on with gravity at the start, then as their time says.
-    masses: hung at nodes. faces_touch: boundary facets that lie on each other at rest, those of a cut, may not overlap;
-    they slide on each other without friction, by less than a facet.
+    order: degree integrated exactly, None = default of the element (for P2/P1 it is 5, the lowest with positive weights
+    and at least 4, which p J needs). loads: dead forces, applied with gravity at the start, then functions of time.
+    masses: point masses at nodes. faces_touch: boundary facets that coincide at rest, those of a cut, may not overlap;
+    they slide without friction, by less than a facet.
     """
 
     mesh: MeshTet
@@ -83,7 +83,7 @@ class HeldNodes:
 
 
 def find_held(problem: Problem) -> list[HeldNodes]:
-    """Held regions as unknowns; raises SolveError when a region finds no node or names a wrong component."""
+    """Held regions as unknowns; raises SolveError if a region contains no node or names a wrong component."""
     element = find_element(problem.element)
     x = displacement_points(problem.mesh, element)
     boundary = np.unique(build_facets(problem.mesh, problem.contact_order, element).nodes)

@@ -1,4 +1,5 @@
-"""Problems whose answers are known from elsewhere: closed forms, published numbers, other codes (docs/theory.md)."""
+"""Oracles: problems with independent solutions, such as closed forms, published numbers, other codes
+(docs/theory.md)."""
 
 from reference_fem.oracles import (
     ball,
@@ -16,6 +17,6 @@ from reference_fem.oracles.base import Check, Curve, Oracle, Outcome
 
 MODULES = (uniaxial, patch, thick_sphere, cylinder, cook, ringing, kappa, manufactured, ball, hertz)
 ORACLES: tuple[Oracle, ...] = (*(module.ORACLE for module in MODULES), manufactured.OTHERS)
-"""The pack; those that are `fast` are the half that every change must pass."""
+"""All oracles. Every change must pass those that are `fast`, about half of them."""
 
 __all__ = ["ORACLES", "Check", "Curve", "Oracle", "Outcome"]

@@ -1,4 +1,4 @@
-"""A ball squeezed between two frictionless planes, by an eighth of it."""
+"""A ball squeezed between two frictionless planes, reduced to an eighth by symmetry."""
 
 from collections.abc import Sequence
 
@@ -15,29 +15,29 @@ from reference_fem.oracles.bodies import ball_octant, symmetry
 from reference_fem.statics.equilibrium import Equilibrium, equilibrium_path
 
 KAPPA = 5000.0
-"""Over mu."""
+"""Bulk modulus over mu."""
 JUDGED = (0.10, 0.15, 0.20, 0.25, 0.30, 0.35)
-"""Approaches of the planes over the diameter; the path starts at half the first."""
+"""Approaches of the planes, over the diameter, that are checked; the path starts at half the first."""
 FAMILY = (5, 7, 10)
-"""Elements to a quarter circle."""
+"""Elements per quarter circle."""
 GRADE, RADIAL = 0.35, 0.5
 """Finer at the pole and towards the surface: see ball_octant."""
 
 
 def squeeze(mesh: MeshTet, shares: Sequence[float], kappa: float = KAPPA) -> tuple[Problem, list[Equilibrium]]:
-    """(problem, equilibria) of an octant of unit radius and modulus, at approaches over the diameter."""
+    """(problem, equilibria) of an octant of unit radius and modulus, at approaches `shares` over the diameter."""
     plane = RigidPlane((0.0, 0.0, 1.0), (0.0, 0.0, -1.0), lambda t: (0.0, 0.0, -t))
     problem = Problem(mesh, NeoHookean(1.0, kappa), symmetry(), [plane])
     return problem, equilibrium_path(problem, shares)
 
 
 def whole_force(state: Equilibrium) -> float:
-    """Force of one plane on the whole ball [mu R²]: four octants lean on it."""
+    """Force of one plane on the whole ball [mu R²]: it touches four octants."""
     return -4.0 * float(state.obstacle_force[0, 2])
 
 
 def measure() -> Outcome:
-    """Force, equator and volume on the finest mesh; the force's error at 0.30 over mesh size."""
+    """Force, equator radius and volume on the finest mesh; error of the force at an approach of 0.30 over mesh size."""
     checks, errors = [], []
     for cells in FAMILY:
         mesh = ball_octant(cells, GRADE, RADIAL)

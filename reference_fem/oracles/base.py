@@ -1,4 +1,4 @@
-"""What an oracle says: numbers held against the truth, and errors over mesh size."""
+"""Results of an oracle: numbers compared with the truth, and errors over mesh size."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ from reference_fem.model.problem import Problem
 
 @dataclass(frozen=True)
 class Check:
-    """One number held against the truth."""
+    """One number compared with the truth."""
 
     quantity: str
     unit: str
@@ -25,7 +25,8 @@ class Check:
     unknowns: int
     absolute: bool = False
     kind: Literal["within", "at least", "misses"] = "within"
-    """at least: only a smaller value deviates. misses: a control, known to be wrong: it must deviate by more."""
+    """at least: only a smaller value is a deviation. misses: a control that is expected to be wrong, so it must deviate
+    by more."""
 
     @property
     def deviation(self) -> float:
@@ -37,7 +38,7 @@ class Check:
 
     @property
     def met(self) -> bool:
-        """Whether the number is where it must be; a NaN never is."""
+        """Whether the check passes; NaN never does."""
         return self.deviation > self.tolerance if self.kind == "misses" else self.deviation <= self.tolerance
 
 
@@ -46,7 +47,7 @@ class Curve:
     """Error of one quantity over mesh size."""
 
     panel: str
-    """What is measured: curves of one panel share axes."""
+    """Name of the panel; curves of one panel share axes."""
     label: str
     sizes: tuple[float, ...]
     """Element size over the size of the body, from coarse to fine."""
@@ -62,7 +63,7 @@ class Curve:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What one oracle found."""
+    """The result of one oracle."""
 
     checks: tuple[Check, ...]
     curves: tuple[Curve, ...] = ()
@@ -70,7 +71,7 @@ class Outcome:
 
 @dataclass(frozen=True)
 class Oracle:
-    """A problem whose answer is known from elsewhere."""
+    """A problem with an independent solution."""
 
     name: str
     title: str
@@ -81,6 +82,6 @@ class Oracle:
 
 
 def unknowns(problem: Problem) -> int:
-    """Unknowns of a problem, held ones among them."""
+    """Number of unknowns of a problem, including held ones."""
     element, mesh = find_element(problem.element), problem.mesh
     return 3 * len(displacement_points(mesh, element)) + (mesh.nvertices if element.pressure else 0)

@@ -13,7 +13,7 @@ from reference_fem.model.problem import PrescribedDisplacement
 
 
 def block(cells: Sequence[int] = (2, 2, 2), skew: float = 0.0):
-    """Unit cube; skew moves its inner vertices, so that no element is like another."""
+    """Unit cube; skew moves its inner vertices, so that all elements differ."""
     mesh = MeshTet.init_tensor(*[np.linspace(0.0, 1.0, n + 1) for n in cells])
     inner = np.all((mesh.p > 1e-9) & (mesh.p < 1 - 1e-9), axis=0)
     mesh.p[:, inner] += skew * np.random.default_rng(3).uniform(-1.0, 1.0, (3, inner.sum()))
@@ -21,7 +21,7 @@ def block(cells: Sequence[int] = (2, 2, 2), skew: float = 0.0):
 
 
 def symmetry():
-    """The three coordinate planes, each holding its own component."""
+    """The three coordinate planes; each holds the component normal to it."""
     return [PrescribedDisplacement(lambda x, c=c: np.abs(x[c]) < 1e-9, (c,)) for c in range(3)]
 
 
@@ -42,7 +42,7 @@ def kuhn_simplex(n: int):
 
 
 def towards_pole(direction: np.ndarray, grade: float):
-    """Unit vectors moved towards +z: the polar angle's slope there is `grade`."""
+    """Unit vectors moved towards +z; at the pole the polar angle is scaled by `grade`."""
     share = np.arccos(np.clip(direction[:, 2], -1.0, 1.0)) / (np.pi / 2)
     angle = np.pi / 2 * (grade * share + (1.0 - grade) * share**2)
     across = np.hypot(direction[:, 0], direction[:, 1])
@@ -72,7 +72,7 @@ def whole_ball(n: int):
     corners = octant.doflocs[:, : octant.nvertices].T
     points = np.concatenate([corners * sign for sign in signs])
     elements = np.concatenate([octant.t.T + k * len(corners) for k in range(8)])
-    # 1e-9 of the radius joins what mirroring parted by round-off; adding zero turns -0.0 into 0.0
+    # a tolerance of 1e-9 of the radius joins mirrored nodes that differ by round-off; adding zero turns -0.0 into 0.0
     _, first, merged = np.unique(points.round(9) + 0.0, axis=0, return_index=True, return_inverse=True)
     return round_off(points[first], merged[elements], (1.0,))
 
@@ -105,7 +105,7 @@ def round_off(points: np.ndarray, elements: np.ndarray, radii: Sequence[float]):
 
 
 def on_radius(radius: float):
-    """Whether points (3, N) lie on a sphere about the origin: a function of theirs."""
+    """A function of points (3, N) that returns whether each is on the sphere of this radius about the origin."""
     return lambda x: np.abs(np.linalg.norm(x, axis=0) - radius) < 1e-9
 
 
@@ -116,7 +116,7 @@ def mapped(cells: Sequence[int], place: Callable[[np.ndarray], np.ndarray]):
 
 
 def straight(mesh: MeshTet):
-    """The same mesh without mid-side nodes of its own."""
+    """The same mesh with straight sides, without mid-side nodes."""
     return MeshTet(np.ascontiguousarray(mesh.doflocs[:, : mesh.nvertices]), mesh.t)
 
 

@@ -16,7 +16,7 @@ LEFT, LOWER, UPPER, RIGHT = 44.0, 44.0, 60.0, 48.0
 MU, FORCE = 80.1938, 100.0
 """[MPa], and [N] for each mm of thickness."""
 KAPPA = 1e5
-"""Over MU: the truth is incompressible."""
+"""Bulk modulus over MU; the truth is incompressible."""
 FAMILY = (4, 8, 16)
 TOWARDS_WALL, TOWARDS_CORNERS = 1.6, 0.8
 """Grading: the stress is singular at both ends of the held edge, where even cells converge with order one."""
@@ -57,7 +57,7 @@ def bend(cells: int):
 
 
 def measure() -> Outcome:
-    """Three displacements on the finest mesh, the corner's error over mesh size."""
+    """Three displacements on the finest mesh; error at the corner over mesh size."""
     bends = [bend(cells) for cells in FAMILY]
     problem, last = bends[-1]
     mesh = f"slab, {FAMILY[-1]} x {FAMILY[-1]} cells, graded"

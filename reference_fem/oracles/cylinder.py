@@ -1,4 +1,4 @@
-"""MacNeal and Harder's thick cylinder under pressure, nearly incompressible: what locks misses it by a lot."""
+"""MacNeal and Harder's thick cylinder under pressure, nearly incompressible: elements that lock have large errors."""
 
 import numpy as np
 
@@ -15,16 +15,16 @@ from reference_fem.statics.equilibrium import equilibrium_path
 INNER, OUTER, YOUNG = 3.0, 9.0, 1000.0
 THICKNESS = 0.3
 SCALE = 1e-2
-"""Of the pressure: the oracle is linear, and strains of 2e-5 leave a deviation of that size. Smaller ones drown: at
-kappa/mu = 5000 round-off in J is multiplied by kappa."""
+"""Factor on the pressure. The oracle is linear, and strains of 2e-5 cause a deviation of that size. Smaller strains are
+lost in round-off of J, which is multiplied by kappa (kappa/mu = 5000)."""
 CELLS = {"P2/P1": (6, 8), "MINI": (16, 20), "P2/P0": (6, 8), "P1": (16, 20)}
 """Cells along the radius and around the quarter circle."""
 FAMILY = ((1, 2), (2, 3), (3, 4))
-"""Of the default element, for the error over mesh size."""
+"""Cells of the default element for the error over mesh size."""
 
 
 def quarter(cells: tuple[int, int], element: str):
-    """A quarter of the ring, one element thick; straight-sided for a linear element that has no pressure of its own."""
+    """A quarter of the ring, one element thick; straight-sided for a linear element without pressure unknowns."""
 
     def place(s: np.ndarray):
         radius, angle = INNER * (OUTER / INNER) ** s[0], 0.5 * np.pi * s[1]
@@ -53,7 +53,7 @@ def press(element: str, ratio: float, cells: tuple[int, int]):
 
 
 def measure() -> Outcome:
-    """The default at three ratios, every other element at the worst of them."""
+    """The default element at three ratios, all others at the ratio nearest to 1/2."""
     checks = []
     for name, element in ELEMENTS.items():
         for ratio, truth in exact.THICK_CYLINDER.items():

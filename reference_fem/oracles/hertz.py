@@ -6,13 +6,14 @@ from reference_fem.oracles.base import Check, Oracle, Outcome, unknowns
 from reference_fem.oracles.bodies import ball_octant
 
 SHARES = (0.01, 0.02)
-"""Approaches over the diameter. Finite strain adds a term about linear in the approach (3 % at 0.01, 5 % at 0.02)."""
+"""Approaches over the diameter. Finite strain adds a term that is about linear in the approach (3 % at 0.01, 5 % at
+0.02)."""
 CELLS, GRADE, RADIAL = 10, 0.1, 0.8
-"""Elements at the pole are a hundredth of the radius: eight or more to the contact radius of 0.1."""
+"""Elements at the pole are a hundredth of the radius: eight or more per contact radius of 0.1."""
 
 
 def measure() -> Outcome:
-    """Force over Hertz's at two approaches, extrapolated linearly to none."""
+    """Force over that of Hertz at two approaches, extrapolated linearly to approach 0."""
     mesh = ball_octant(CELLS, GRADE, RADIAL)
     problem, path = squeeze(mesh, SHARES)
     ratios = [whole_force(state) / exact.hertz_plane_force(1.0, 1.0, state.t) for state in path]

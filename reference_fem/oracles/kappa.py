@@ -1,4 +1,4 @@
-"""How a result depends on kappa/mu: it tends to the incompressible one like mu/kappa."""
+"""Dependence of results on kappa/mu: the difference from the incompressible result is of order mu/kappa."""
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from reference_fem.system.saddle_point import NewtonSettings
 RATIOS = (10.0, 1e2, 1e3, 1e4, 1e5)
 STRETCH, SHARE = 1.5, 0.20
 SHELL, BALL = (5, 3), 5
-"""Meshes: the same for every ratio, so that their own error drops out of the comparison."""
+"""Meshes, the same for every ratio, so that their discretisation error cancels."""
 
 
 def sphere_pressure(ratio: float) -> tuple[Problem, float]:
@@ -37,7 +37,7 @@ def dependence() -> dict[str, np.ndarray]:
 
 
 def measure() -> Outcome:
-    """The order of approach, and what is left at the largest ratio."""
+    """The order of convergence in mu/kappa, and the difference left at the largest ratio."""
     spheres = {ratio: sphere_pressure(ratio) for ratio in RATIOS}
     problem, last = spheres[RATIOS[-1]]
     change = [abs(spheres[ratio][1] / last - 1.0) for ratio in (1e2, 1e3)]

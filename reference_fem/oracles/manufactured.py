@@ -1,4 +1,4 @@
-"""A smooth motion made up, the body force that it needs, and how fast each element finds it.
+"""Manufactured solution: a smooth motion, the body force that it needs, and the order of convergence of each element.
 
 Three shears and a stretch, phi = S∘C∘B∘A: A adds a sin(pi Y / 2) to x, B adds b sin(pi z) to y, C adds c sin(pi x / 2)
 to z, all of unit determinant, and S multiplies z by 1 + q(x, y) / kappa. So J = 1 + q / kappa, and the pressure is q.
@@ -27,7 +27,7 @@ SHEARS, PRESSURE = (0.15, 0.10, 0.12), 2.0
 """a, b, c [m] and the largest pressure over the shear modulus."""
 MATERIAL = MooneyRivlin(0.3, 0.2, 1000.0)
 CELLS = {"P2/P1": (4, 6, 8), "MINI": (4, 6, 8), "P2/P0": (4, 6, 8), "P1": (4, 6, 8)}
-"""Cells along each edge of the cube; six tetrahedra to a cell."""
+"""Cells along each edge of the cube; six tetrahedra per cell."""
 
 
 def motion(X: np.ndarray, kappa: float):
@@ -68,7 +68,7 @@ def body_force(material: Material) -> Callable:
 
 
 def build(name: str, cells: int, material: Material = MATERIAL) -> Problem:
-    """The cube under the body force, its whole boundary moved as the motion wants."""
+    """The cube under the body force, with its whole boundary moved as in the motion."""
 
     def displacement(x: np.ndarray):
         return motion(x, material.kappa)[0] - x
@@ -126,7 +126,8 @@ def orders(names: Iterable[str]) -> Outcome:
         about = (f"cube, {problem.mesh.nelements} {name}", unknowns(problem))
         pair = curves(name)
         for what, rate, curve in zip("up", ELEMENTS[name].rates, pair, strict=True):
-            # 0.15: between these meshes the default's slopes still move by 0.1; the others need not be sharp
+            # 0.15: between these meshes the orders of the default still change by 0.1; those of the others need not be
+            # sharp
             kind = "within" if name == DEFAULT else "at least"
             quantity = f"order of the error of {what}, {name}"
             checks.append(Check(quantity, "1", rate, curve.order, 0.15, *about, absolute=True, kind=kind))

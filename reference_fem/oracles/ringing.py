@@ -1,4 +1,4 @@
-"""A free ball that rings: its twisting and its shape-changing modes of order two."""
+"""Vibrations of a free ball: its torsional and spheroidal modes of order two."""
 
 import numpy as np
 
@@ -10,9 +10,9 @@ from reference_fem.oracles.base import Check, Curve, Oracle, Outcome, unknowns
 from reference_fem.oracles.bodies import whole_ball
 
 RATIOS = {5000.0: 0.5, 5.0 / 3.0: 0.25}
-"""kappa/mu -> Poisson's ratio; 5000 is 0.4999, and moves the frequency by less than 1e-4."""
+"""kappa/mu -> Poisson's ratio; 5000 is 0.4999, and changes the frequency by less than 1e-4."""
 FAMILY = (2, 3)
-"""Elements to a quarter circle."""
+"""Elements per quarter circle."""
 
 
 def ring(cells: int, kappa: float):
@@ -22,7 +22,7 @@ def ring(cells: int, kappa: float):
 
 
 def measure() -> Outcome:
-    """Both families of five modes for both materials; the error of the twisting ones over mesh size."""
+    """Both families of five modes for both materials; error of the torsional ones over mesh size."""
     checks, errors = [], []
     for kappa, ratio in RATIOS.items():
         problem, omega = ring(FAMILY[-1], kappa)

@@ -14,9 +14,9 @@ from reference_fem.system.state import NewtonSettings
 
 STRETCHES = (1.1, 1.25, 1.5)
 MESHES = {0.5: ((4, 3), (6, 4), (8, 5)), 0.8: ((8, 3),)}
-"""Inner over outer radius -> meshes of an octant: elements to a quarter circle, layers."""
+"""Inner over outer radius -> meshes of an octant: elements per quarter circle, layers."""
 KAPPA = 5000.0
-"""Over mu; the closed form is incompressible, which moves the pressure by about mu/kappa."""
+"""Bulk modulus over mu. The closed form is incompressible; its pressure differs by about mu/kappa."""
 
 
 def inflate(inner: float, mesh: MeshTet):

@@ -13,7 +13,7 @@ from reference_fem.system.state import NewtonSettings
 STRETCHES = (0.7, 0.8, 0.9, 1.5)
 LAWS = {"neo-Hookean": NeoHookean(1.0, 1000.0), "Mooney-Rivlin": MooneyRivlin(0.3, 0.2, 1000.0)}
 TIGHT = NewtonSettings(force_tol=1e-11, volume_tol=1e-12)
-"""Newton converges quadratically: one more iteration, and round-off alone is left."""
+"""Newton converges quadratically: after one more iteration only round-off is left."""
 
 
 def pull(material: Material, stretch: float, mesh: MeshTet, element: str = "P2/P1"):

@@ -1,10 +1,10 @@
 """Which points are in contact at the end of a Newton step: its linearised contact problem, solved to the end.
 
 With the body and the obstacles' surfaces linearised, the pressures are still t = max(0, m - eps (g + n·d)). Newton's
-tangent takes the points that touch as known; where others touch, its step ends out of balance and points flicker from
-step to step. Each point that changes is a rank-one change eps w b bᵀ of the tangent, b = n N, so that the factors serve
-for any set of points (Sherman, Morrison and Woodbury; Hager, SIAM Review 31, 1989; docs/theory.md, eq. 6.5), and a
-semismooth Newton iteration finds the set (Hintermüller, Ito and Kunisch, SIAM J. Optim. 13, 2003).
+tangent assumes a fixed set of touching points; if other points touch, the step ends out of balance and points alternate
+from step to step. Each point that changes is a rank-one change eps w b bᵀ of the tangent, b = n N, so that the same
+factors can be used for any set of points (Sherman, Morrison and Woodbury; Hager, SIAM Review 31, 1989; docs/theory.md,
+eq. 6.5), and a semismooth Newton iteration finds the set (Hintermüller, Ito and Kunisch, SIAM J. Optim. 13, 2003).
 """
 
 from typing import NamedTuple
@@ -21,22 +21,23 @@ from reference_fem.statics.tangent import Tangent
 from reference_fem.system.saddle_point import System
 
 ROUNDS = 20
-"""Sets of points that are tried: it takes 2 to 7; the set of the last round is as good a direction as any."""
+"""Most sets of points that are tried; 2 to 7 are usual. The set of the last round gives a usable direction in any
+case."""
 
 BATCH = 64
-"""Right-hand sides solved at once: a column then costs a quarter of a solve of its own, and little memory."""
+"""Right-hand sides solved at once: a column then costs a quarter of a single solve, and little memory."""
 
 MOST = 512
-"""Points that may change: more would cost more than the factorisation that they save."""
+"""Most points that may change: more would cost more than the factorisation that they save."""
 
 
 class Points(NamedTuple):
-    """Contact points that may begin or cease to touch, np of them."""
+    """The np contact points that may begin or cease to touch."""
 
     directions: sp.csr_matrix
-    """b = n N of each, so that b·d is how far it moves off its obstacle, (np, total)."""
+    """b = n N of each, so that b·d is its motion away from its obstacle, (np, total)."""
     gap: np.ndarray
-    """Where the obstacle will be [m]."""
+    """Gap to the obstacle at its new position [m]."""
     multiplier: np.ndarray
     """m [Pa]."""
     penalty: np.ndarray
@@ -44,9 +45,9 @@ class Points(NamedTuple):
     area: np.ndarray
     """Rest area w [m²]."""
     touching: np.ndarray
-    """Whether the tangent counts it as in contact, bool."""
+    """Whether the tangent treats it as in contact, bool."""
     excess: np.ndarray
-    """Pressure that the tangent counts with and the residual lacks [Pa]."""
+    """Pressure on which the tangent is based minus that in the residual [Pa]."""
     place: tuple
     """Obstacle, facet and point of each; on the faces of a cut facet and point."""
 
@@ -64,7 +65,7 @@ def look_at(rows: np.ndarray, y: np.ndarray, gap: np.ndarray, normal: np.ndarray
 def points_near(system: System, touch: Touch, x: np.ndarray, change: np.ndarray) -> Points:
     """The points on facets that are, or after the change will be, no farther from an obstacle than their size.
 
-    Of a stuck point only the normal part takes part: its traction stays as the tangent has it.
+    Of a stuck point only the normal part is included: its traction stays as in the tangent.
     """
     surface, counted = system.surface, touch.guess if len(touch.guess) else touch.pressure
     y = point_positions(x, surface)
@@ -103,16 +104,16 @@ def points_between(system: System, touch: FaceTouch, x: np.ndarray, change: np.n
 
 
 def together(one: Points, other: Points) -> Points:
-    """Points of both; their places are left to them."""
+    """Points of both, without their places."""
     directions = sp.csr_matrix(sp.vstack([one.directions, other.directions]))
     gap, m, eps, area, touching, excess = (np.concatenate(both) for both in zip(one[1:-1], other[1:-1], strict=True))
     return Points(directions, gap, m, eps, area, touching, excess, ())
 
 
 class Influence:
-    """How all points move when one of them is pushed; found when first asked for.
+    """How all points move when one of them is pushed; computed on first use.
 
-    Newton's change, solved before with the same factors, has checked them: these solves are not checked again.
+    These solves are not checked: Newton's change, solved before with the same factors, has checked the factors.
     """
 
     def __init__(self, system: System, tangent: Tangent, points: Points):
@@ -139,7 +140,7 @@ def settled(system: System, tangent: Tangent, x: np.ndarray, change: np.ndarray)
     """Newton's change (total,) of x with the contact of the linearised problem settled, and its pressures at obstacles
     (no, nf, nq) and between faces (nf, nq).
 
-    The next tangent counts with those: they tell better than the gaps which points are going to touch.
+    The next tangent is based on these pressures: they predict better than the gaps which points will touch.
     """
     touch, faces = tangent.evaluation.touch, tangent.evaluation.faces
     parts = points_near(system, touch, x, change), points_between(system, faces, x, change)
@@ -172,12 +173,13 @@ def pressures(points: Points, gap: np.ndarray):
 
 
 def changed(points: Points, gap: np.ndarray):
-    """Numbers of the points that touch although the tangent does not count them, or the other way round."""
+    """Numbers of the points that touch but are not in the tangent, or are in the tangent but do not touch."""
     return np.flatnonzero((pressures(points, gap) > 0.0) != points.touching)
 
 
 def pushes(points: Points, chosen: np.ndarray, moves: np.ndarray, gap: np.ndarray):
-    """Forces [N] at the points that change, (k,): +w t of those that touch, -w t of those that the tangent holds.
+    """Forces [N] at the points that change, (k,): +w t for those that touch, -w t for those that the tangent treats as
+    touching.
 
     From t = m - eps (gap + moves·push) (eq. 6.5); moves (k, k): among themselves.
     """
@@ -188,9 +190,11 @@ def pushes(points: Points, chosen: np.ndarray, moves: np.ndarray, gap: np.ndarra
 
 
 def share_of(points: Points, push: np.ndarray, more: np.ndarray, gap: np.ndarray, moved: np.ndarray):
-    """The share of a change of pushes and gaps, up to 1, that lowers the potential most: without it sets may cycle.
+    """Line search: the share of a change of pushes and gaps, up to 1, that lowers the potential most. Without it sets
+    may cycle.
 
-    Its slope, sum moved (push - w (t - t the tangent counts)), grows with the share: bisected to a thousandth.
+    The slope, sum moved (push - w (t - t of the tangent)), grows with the share; bisection finds its root to a
+    thousandth.
     """
 
     def slope(share: float):

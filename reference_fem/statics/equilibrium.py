@@ -1,4 +1,4 @@
-"""Loading paths: equilibria at wanted times, with sub-steps that shrink on failure and grow again."""
+"""Loading paths: equilibria at given times, with sub-steps that shrink after failures and grow again."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -69,7 +69,7 @@ class Equilibrium:
 
 @dataclass(frozen=True, eq=False)
 class Checkpoint:
-    """A path half-way: what was found at its first times, and all that the next load step starts from."""
+    """An interrupted path: the results at its first times, and the state from which the next load step starts."""
 
     path: list[Equilibrium]
     state: State
@@ -82,10 +82,11 @@ def equilibrium_path(
     on_step: Callable[[Equilibrium], None] | None = None,
     on_checkpoint: Callable[[Checkpoint], None] | None = None,
 ) -> list[Equilibrium]:
-    """Equilibria at the given times [s], reached from rest at settings.start; on_step sees each as it is found.
+    """Equilibria at the given times [s], reached from rest at settings.start. on_step is called with each as it is
+    found.
 
-    on_checkpoint sees each with its unknowns.
-    Dead loads and cavities that start filled are switched on first, at the start. Raises SolveError for a problem
+    on_checkpoint is called with each and its unknowns.
+    Dead loads and cavities that start filled are applied first, at the start time. Raises SolveError for a problem
     that cannot be set up, and when a sub-step below settings.smallest_step still fails: then its `converged` holds
     what was reached.
     """
@@ -141,7 +142,7 @@ def stuck(state: State, t: float, failure: Exception, path: Sequence[Equilibrium
 
 
 def describe(system: System, state: State, iterations: int, substeps: int) -> Equilibrium:
-    """Everything worth knowing about a converged state."""
+    """The Equilibrium of a converged state."""
     n, elements = system.displacement_count, system.elements
     evaluation = system.evaluate(state.x, system.loads_of(state), tangent=False)
     slip = farthest_slip(state.x, system.faces, evaluation.faces)

@@ -1,7 +1,7 @@
-"""Nested iteration: a solution is carried from a mesh to a finer one of the same body and solved there.
+"""Nested iteration: a solution is transferred from a mesh to a finer mesh of the same body and solved there.
 
-Newton then starts next to the answer: 2 to 4 iterations where a path from rest takes 5 to 9 for each load step, and
-no path is needed (docs/theory.md, section 6).
+Newton then starts near the solution: it takes 2 to 4 iterations and no load path, where a path from rest takes 5 to 9
+per load step (docs/theory.md, section 6).
 """
 
 from dataclasses import replace
@@ -23,24 +23,24 @@ from reference_fem.system.saddle_point import System
 from reference_fem.system.state import State
 
 REPAIRS = 20
-"""Times that inverted elements of a carried field are repaired; 1 to 3 are enough where it can be."""
+"""Most rounds of repairing inverted elements of a transferred field; if a repair is possible, 1 to 3 are enough."""
 
 
 SMALLEST_SHARE = 1 / 64
-"""Smallest part of the unbalanced forces that is taken away at once."""
+"""Smallest part of the unbalanced forces that is removed at once."""
 
 
 class Transfer(NamedTuple):
-    """Where the P2 nodes of a finer mesh are in a coarser one, n of them."""
+    """Positions of the n P2 nodes of a finer mesh in a coarser one."""
 
     corners: np.ndarray
-    """Vertices of the element of each, (n, 4)."""
+    """Vertices of the coarse element of each node, (n, 4)."""
     linear: np.ndarray
-    """Values of their functions there, (n, 4)."""
+    """Their linear shape functions at the node, (n, 4)."""
     table: np.ndarray
     """The ten P2 nodes of the element, (n, 10)."""
     quadratic: np.ndarray
-    """Values of their functions there, (n, 10)."""
+    """Their quadratic shape functions at the node, (n, 10)."""
 
     def displacement(self, u: np.ndarray) -> np.ndarray:
         """A field at the P2 nodes of the coarser mesh (N2, c) at those of the finer one, (n, c)."""
@@ -92,9 +92,9 @@ def multipliers(system: System, x: np.ndarray, t: float, pressure: np.ndarray) -
     """Multipliers m (no, nf, nq) [Pa] with which the points of a body at x have the contact pressure t = max(0, m -
     eps g) that is given (docs/theory.md, eq. 6.5).
 
-    A finer surface lies elsewhere than the coarser one by little, and eps times that is up to 25 times the pressure:
-    with the pressures as multipliers the first tangent is not positive definite on volume-preserving changes, and
-    Newton takes 12 iterations in place of 3.
+    The finer surface differs slightly in position from the coarser one, and eps times this difference is up to 25 times
+    the pressure. With the pressures themselves as multipliers, the first tangent is not positive definite on
+    volume-preserving changes, and Newton takes 12 iterations in place of 3.
     """
     rows, penalty = system.obstacles_at(t), system.surface.penalty[:, None]
     gap, normal = np.empty_like(pressure), np.empty((*pressure.shape, 3))
@@ -115,10 +115,10 @@ def carried_between_faces(coarse: System, pressure: np.ndarray, fine: System) ->
 
 
 def continued(system: System, state: State) -> State:
-    """The equilibrium at the time and load of a carried state. Raises StepFailed where Newton finds none from there.
+    """The equilibrium at the time and load of a transferred state. Raises StepFailed if Newton finds none from there.
 
-    Where one step fails, the forces that balance the carried state as it is are taken away little by little: at
-    outlines of held regions the strain grows with each refinement, beyond what one step can follow.
+    If one step fails, dead forces that balance the transferred state are added and then removed in small parts. This is
+    needed at outlines of held regions, where the strain grows with each refinement.
     """
     x = repaired(system, state.x)
     multiplier = multipliers(system, x, state.t, state.pressure)
@@ -144,7 +144,7 @@ def continued(system: System, state: State) -> State:
 
 
 def unbalanced(system: System, state: State) -> np.ndarray | None:
-    """The dead forces (field_count,) with which a state would be in equilibrium; None where an element is inverted."""
+    """The dead forces (field_count,) with which a state would be in equilibrium; None if an element is inverted."""
     loads = system.loads_of(state)
     evaluation = system.evaluate(state.x, loads, tangent=False)
     if not evaluation.usable:
@@ -155,10 +155,10 @@ def unbalanced(system: System, state: State) -> np.ndarray | None:
 
 
 def repaired(system: System, x: np.ndarray) -> np.ndarray:
-    """Unknowns (total,) with the elements that are inverted at a quadrature point made upright, where that is easy.
+    """Unknowns (total,) with inverted elements repaired where a simple change is enough.
 
-    The displaced middles of such an element are put between its displaced vertices, as at rest; if that is not enough,
-    its displacements are averaged with those of its neighbours. Held unknowns stay.
+    The mid-side nodes of an element that is inverted at a quadrature point are displaced as the mean of their vertices;
+    if that is not enough, its displacements are averaged with those of its neighbours. Held unknowns do not change.
     """
     table, n = element_nodes(system.problem.mesh), system.displacement_count
     sides = table[:, [[0, 1, 4], [1, 2, 5], [0, 2, 6], [0, 3, 7], [1, 3, 8], [2, 3, 9]]]

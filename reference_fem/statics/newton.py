@@ -14,8 +14,8 @@ from reference_fem.system.saddle_point import Evaluation, System
 from reference_fem.system.state import Loads, NewtonSettings, State
 
 PENALTY_GROWTH = 2.0
-"""Factor on the contact penalty at each multiplier update inside a step: plain updates gain little where a facet is
-partly in contact, for its points then ask for more than six nodes can give."""
+"""Factor on the contact penalty at each multiplier update inside a step: updates alone converge slowly if a facet is
+partly in contact, since its points then pose more conditions than six nodes can satisfy."""
 
 MERIT_GROWTH = 5.0
 """Largest rise of the error in one accepted iteration: points that come into contact raise it before it falls."""
@@ -25,14 +25,15 @@ LOOSE = 1e4
 
 
 HESITATION = 8
-"""Iterations in which a stuck point may be let go and held again; then what is let go stays so to the end of the load
-step. Held, some points are not pressed, and let go, they are: without this they would come and go for ever."""
+"""Iterations in which a stuck point may be released and held again; after that a released point stays released to the
+end of the load step. Some points have no pressure while held but have one when released, and would alternate without
+end."""
 
 
 SHUT = 1e-6
-"""Gap between the faces of a cut, over the root of their area, below which they lie on each other: round-off."""
+"""Gap between the faces of a cut, over the root of their area, below which they coincide: round-off."""
 FAINT = 1e-9
-"""A pressure [Pa] that tells such points from others and is none."""
+"""A negligible pressure [Pa] that marks points of closed faces as touching."""
 
 
 class StepFailed(Exception):
@@ -44,8 +45,8 @@ def solve_step(system: System, state: State, t: float, load: float, more: np.nda
 
     more: a further dead force, (field_count,) [N].
 
-    Multipliers are updated, and the penalty raised, only while some point is deeper than allowed, or is pushed from as
-    far outside; the next step starts low again.
+    Multipliers are updated, and the penalty raised, only while some point is deeper than allowed, or is pushed although
+    it is as far outside; the next step starts with the low penalty again.
     """
     target, stiffness = system.held_at(t), 1.0
     force, filling = system.force_at(t, load) + more, system.filling_at(t, load)
@@ -78,26 +79,26 @@ def solve_step(system: System, state: State, t: float, load: float, more: np.nda
 
 
 def first_guess(system: System, state: State, loads: Loads):
-    """The evaluation that the first direction is taken from: where the body is, with the move of the obstacles
+    """The evaluation for the first direction: the body at its current position, with the motion of the obstacles
     linearised."""
     old = system.obstacles_at(state.t)
     loads = loads._replace(rows=old, shift=loads.rows[:, 1:4] - old[:, 1:4])
     if len(system.faces.dofs):
-        # Faces that lie on each other are counted as touching: those that part are easier to find than those that meet.
+        # Coincident faces count as touching: points that separate are easier to find than points that meet.
         shut = gaps_and_slopes(state.x, system.faces)[0] <= SHUT * np.sqrt(system.faces.weights.sum())
         loads = loads._replace(face_guess=np.where(shut, np.maximum(loads.faces, FAINT), loads.faces))
     return system.evaluate(state.x, loads)
 
 
 def let_go(grip: contact.Grip, guess: np.ndarray):
-    """The grip without the points that nothing will press."""
+    """The grip without points whose predicted pressure is 0."""
     return grip._replace(stuck=grip.stuck & (guess > 0.0)) if grip.stuck.size else grip
 
 
 def direction(system: System, evaluation: Evaluation, x: np.ndarray, target: np.ndarray):
-    """Newton's change at x, which also takes the held unknowns to their target; and the contact pressures to expect.
+    """Newton's change at x, which also takes the held unknowns to their target; and the predicted contact pressures.
 
-    Raises StepFailed where the tangent is singular: a shorter step may pass by.
+    Raises StepFailed if the tangent is singular; a shorter step may avoid that.
     """
     try:
         tangent = Tangent(system, evaluation)
@@ -110,7 +111,7 @@ def direction(system: System, evaluation: Evaluation, x: np.ndarray, target: np.
 
 
 def settled(evaluation: Evaluation, settings: NewtonSettings, slack: float):
-    """Whether both relative errors are below their tolerances times slack, and what holds a point also presses it."""
+    """Whether both relative errors are below their tolerances times slack, and every held point is also pressed."""
     if contact.mistaken(evaluation.touch):
         return False
     return evaluation.errors[0] <= slack * settings.force_tol and evaluation.errors[1] <= slack * settings.volume_tol
@@ -131,7 +132,8 @@ def misplaced(system: System, x: np.ndarray, evaluation: Evaluation):
 
 
 def search(system: System, x: np.ndarray, direction: np.ndarray, loads: Loads, before: Evaluation | None):
-    """First of a few halved trial steps that keeps every element upright and does not throw the error far up."""
+    """The first of a few halved trial steps that inverts no element and does not raise the error by more than
+    MERIT_GROWTH."""
     share = 1.0
     while share > 1e-2:
         trial = x + share * direction

@@ -1,4 +1,4 @@
-"""The factored tangent of one evaluation, and what displacement answers a force."""
+"""The factored tangent of one evaluation, and the displacements by given forces."""
 
 import numpy as np
 

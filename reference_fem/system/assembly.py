@@ -71,7 +71,7 @@ def deformation_into(ue: np.ndarray, G: np.ndarray, functions: tuple, F: np.ndar
 
 @compiled()
 def mean_pressure(ue: np.ndarray, gradients: np.ndarray, weights: np.ndarray, functions: tuple, parameters: np.ndarray):
-    """kappa (sum w J / sum w - 1): the pressure [Pa] that solves an element's own volume equation (eq. 6.14)."""
+    """kappa (sum w J / sum w - 1): the pressure [Pa] that solves the volume equation of a single element (eq. 6.14)."""
     F, cof, change, volume = np.empty((3, 3)), np.empty((3, 3)), 0.0, 0.0
     for q in range(weights.shape[0]):
         deformation_into(ue, gradients[q], functions, F)
@@ -167,7 +167,8 @@ def add_pressure_blocks(
 
 
 def deformation(x: np.ndarray, elements: Elements, kappa: float):
-    """F (ne, nq, 3, 3) and p (ne, nq) [Pa] at the quadrature points, in plain NumPy; kappa [Pa] of the material."""
+    """F (ne, nq, 3, 3) and p (ne, nq) [Pa] at the quadrature points, in plain NumPy; kappa: bulk modulus of the
+    material [Pa]."""
     unknown_count, count = elements.dofs.shape[1], 3 * len(elements.sizes.functions)
     local = x[elements.dofs]
     u = local[:, :count].reshape(len(local), 3, -1)
@@ -180,7 +181,7 @@ def deformation(x: np.ndarray, elements: Elements, kappa: float):
 
 
 def energy(x: np.ndarray, elements: Elements, material: Material):
-    """Potential Pi(x) = sum w W(F, p) [J]; written apart from the kernel, to check it."""
+    """Potential Pi(x) = sum w W(F, p) [J]; independent of the kernel, to check it."""
     F, p = deformation(x, elements, material.kappa)
     return float(np.sum(elements.weights * material.energy_density(F, p)))
 

@@ -1,4 +1,4 @@
-"""Refusing what cannot be solved, with one sentence each."""
+"""Checks that raise SolveError, with a message of one sentence, for problems that cannot be solved."""
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -11,7 +11,8 @@ from reference_fem.model.obstacles import gaps
 from reference_fem.model.problem import Problem
 
 START_DEPTH = 1e-3
-"""Depth at the start that is taken as touching, over the size of the body: the sag of a coarse facet."""
+"""Depth at the start that still counts as touching, over the size of the body: the deviation of a coarse facet from a
+curved surface."""
 
 
 def check_mesh(mesh: MeshTet):
@@ -20,7 +21,7 @@ def check_mesh(mesh: MeshTet):
     bad = np.flatnonzero(~np.isfinite(x).all(axis=1))
     if bad.size:
         raise SolveError(f"node {bad[0]} of the mesh is at {x[bad[0]]}: all coordinates must be finite [m]")
-    # a straight mesh has no other points than vertices, also behind the last one that is used
+    # all points of a straight mesh are vertices, including those after the last one in use
     count = mesh.nvertices if isinstance(mesh, MeshTet2) else len(x)
     unused = np.setdiff1d(np.arange(count), mesh.t)
     if unused.size:
@@ -53,7 +54,7 @@ def check_loads(problem: Problem):
 
 
 def check_inertia(problem: Problem):
-    """Refuse a body without mass where motion is asked for."""
+    """Raises SolveError for a body without mass."""
     if problem.density == 0.0:
         raise SolveError("the density is 0 kg/m³: a body that moves needs its mass, give the density")
 
@@ -79,7 +80,7 @@ def rigid_freedoms(x: np.ndarray, held_dofs: np.ndarray):
 
 
 def held_rigid_motions(x: np.ndarray, held_dofs: np.ndarray):
-    """What the held unknowns see of the six rigid motions, padded with zeros to six rows at least."""
+    """The six rigid motions at the held unknowns, padded with zeros to at least six rows."""
     return np.vstack((rigid_motions(x).reshape(-1, 6)[held_dofs], np.zeros((6, 6))))
 
 
@@ -98,7 +99,7 @@ def check_held(x: np.ndarray, held_dofs: np.ndarray):
 
 
 def direction(v: np.ndarray):
-    """A unit vector in print, leading sign positive."""
+    """Text for a unit vector, with positive leading sign."""
     v = v / np.linalg.norm(v)
     v = v * np.sign(v[np.argmax(np.abs(v))])
     return "(" + ", ".join(f"{c + 0.0:.2g}" if abs(c) > 1e-6 else "0" for c in v) + ")"

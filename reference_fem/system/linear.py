@@ -1,4 +1,4 @@
-"""Symmetric indefinite sparse systems: MKL Pardiso when it is there, SciPy's SuperLU otherwise."""
+"""Symmetric indefinite sparse systems: MKL Pardiso if installed, otherwise SciPy's SuperLU."""
 
 import os
 import sys
@@ -23,7 +23,8 @@ SINGLE_FROM = 20_000
 Refinement brings a solve below RESIDUAL_LIMIT all the same (Carson and Higham, SIAM J. Sci. Comput. 40, 2018)."""
 
 REFINEMENTS = 3
-"""Times that a solve is refined by its residual in double precision. Single precision leaves 1e-5 and needs one."""
+"""Most refinements of a solve by its residual in double precision. Factors in single precision leave 1e-5 and need
+one."""
 
 # Pardiso's control vector, numbered as in its manual minus one: own values on; nested dissection; refinement only
 # after perturbed pivots; pivots perturbed below 1e-8; scaling and weighted matching, both advised for saddle points;
@@ -32,7 +33,8 @@ PARDISO_CONTROL = {0: 1, 1: 2, 7: 0, 9: 8, 10: 1, 12: 1, 20: 1}
 
 
 def free_bytes():
-    """Memory that can be had without swapping; all there is where the system does not tell."""
+    """Memory available without swapping [bytes]; the whole physical memory if the system does not report what is
+    available."""
     try:
         lines = Path("/proc/meminfo").read_text(encoding="ascii").splitlines()
     except OSError:
@@ -41,7 +43,7 @@ def free_bytes():
 
 
 def check_memory(needed: float, free: float, unknowns: int):
-    """Refuse factors that do not fit, before the machine swaps; both in bytes."""
+    """Raises SolveError for factors that do not fit into memory, before the machine swaps; both in bytes."""
     if needed > free:
         raise SolveError(
             f"factorising {unknowns} unknowns needs {needed / 1e9:.2g} GB of memory and {free / 1e9:.2g} GB are free: "
@@ -62,7 +64,7 @@ def load_pardiso():
             stacklevel=3,
         )
         return None
-    # Each solver made without this path searches the whole environment for the library, for up to 1.6 s.
+    # Without this path each new solver searches the whole environment for the library, for up to 1.6 s.
     os.environ.setdefault("PYPARDISO_MKL_RT", pypardiso.ps.libmkl._name)  # pyright: ignore[reportOptionalMemberAccess]
     return pypardiso
 
@@ -70,7 +72,7 @@ def load_pardiso():
 class PardisoFactors:
     """LDLᵀ of an upper triangle (CSR, sorted, full diagonal); the analysis is done once per pattern.
 
-    Large factors are in single precision until a matrix is factorised afresh.
+    Large factors are in single precision until `factor` is called with `afresh`.
     """
 
     def __init__(self, pypardiso: ModuleType):
@@ -92,13 +94,14 @@ class PardisoFactors:
         return self.solver._call_pardiso(self.upper, b)
 
     def needed_bytes(self):
-        """What the factors will take, known once the pattern is analysed: Pardiso's iparm(15), (16) and (17) [kB]."""
+        """Memory for the factors [bytes], after the analysis of the pattern, from Pardiso's iparm(15), (16) and (17)
+        [kB]."""
         while_analysing, kept, factors = (int(self.solver.iparm[index]) for index in (14, 15, 16))
         return 1024 * max(while_analysing, kept + factors)
 
     def factor(self, upper: sp.csr_matrix, afresh: bool = False):
-        """Factorise; the matching and ordering of the first matrix serve its successors unless afresh, and then this
-        and all later ones are in double precision."""
+        """Factorises. Matching and ordering of the first matrix are used for later ones, unless `afresh`; then this and
+        all later factors are in double precision."""
         self.fresh = self.fresh or afresh
         single = len(upper.indptr) > SINGLE_FROM and not self.fresh
         if afresh or not self.analysed:
@@ -121,7 +124,7 @@ class PardisoFactors:
         return size * self.call(33, np.asfortranarray(b / size, np.float32)).astype(float)
 
     def release(self):
-        """Give MKL's memory back: it is invisible to Python's collector."""
+        """Releases the memory of MKL, which Python's garbage collector does not see."""
         if self.analysed:
             self.call(-1, np.zeros(len(self.upper.indptr) - 1, self.upper.dtype))
             self.analysed = False
@@ -136,7 +139,7 @@ class ScipyFactors:
         self.solve_with: Callable = np.asarray
 
     def factor(self, upper: sp.csr_matrix, afresh: bool = False):
-        """Factorise; afresh asks for full partial pivoting."""
+        """Factorises; `afresh`: with full partial pivoting."""
         whole = (upper + sp.triu(upper, 1).T).tocsc()
         threshold = 1.0 if afresh else 0.01
         options = {"SymmetricMode": not afresh}
@@ -153,7 +156,7 @@ class ScipyFactors:
 
 
 class SymmetricSolver:
-    """Solves K x = b for a K given by its upper triangle; checks answers by their residual.
+    """Solves K x = b for a K given by its upper triangle; checks solutions by their residual.
 
     Raises SolveError when K is singular to working precision.
     """
@@ -166,7 +169,7 @@ class SymmetricSolver:
         self.upper = sp.csr_matrix((1, 1))
 
     def factor(self, upper: sp.csr_matrix):
-        """Take K, by its upper triangle; raises SingularTangent."""
+        """Factorises K, given by its upper triangle; raises SingularTangent."""
         self.upper = upper
         self.try_factor(afresh=False)
 
@@ -183,9 +186,8 @@ class SymmetricSolver:
     def solve(self, b: np.ndarray, checked: bool = True):
         """x with |K x - b| <= RESIDUAL_LIMIT |b|, of the shape of b, (n,) or (n, k) for k right-hand sides at once.
 
-        One fresh analysis in double precision is tried before giving up. checked=False leaves the residual out: for
-        further right-hand sides of factors that passed the check with another one. The check costs as much as the
-        solve.
+        One fresh analysis in double precision is tried before giving up. checked=False skips the residual: for further
+        right-hand sides with factors that another one has checked. The check takes as long as the solve.
         """
         if not checked:
             return self.factors.solve(b)
@@ -202,7 +204,7 @@ class SymmetricSolver:
         return x
 
     def refined(self, b: np.ndarray):
-        """x of the factors, refined by its residual where that is too large; the largest entry of that over b's."""
+        """(x from the factors, refined if its residual is too large; largest entry of the residual over that of b)."""
         x, size = self.factors.solve(b), np.abs(b).max() or 1.0
         for attempt in range(REFINEMENTS + 1):
             with np.errstate(invalid="ignore", over="ignore"):

@@ -1,4 +1,4 @@
-"""The sparsity pattern, found once: where each entry of each small matrix goes in the big one.
+"""The sparsity pattern, built once: the slot in the global matrix for each entry of each local matrix.
 
 Only the upper triangle of the free unknowns is kept, plus the columns of held unknowns (they lift a prescribed
 increment to the right-hand side). Entries that belong to neither go to one spare slot at the end.

@@ -19,12 +19,12 @@ from reference_fem.system.pattern import build_pattern
 from reference_fem.system.state import Loads, NewtonSettings, State
 
 TOUCHING = 1e-6
-"""Gap over the size of the body below which a point sticks to a no-slip obstacle from the start: round-off, no more."""
+"""Gap over the size of the body below which a point sticks to a no-slip obstacle from the start: only round-off."""
 
 
 @dataclass
 class Evaluation:
-    """Residual (full), tangent values, least J, contact state, and the two relative errors that Newton drives down."""
+    """Residual (full), tangent values, least J, contact state, and the two relative errors that Newton reduces."""
 
     residual: np.ndarray
     """One entry for each unknown; those of the cavities are volume misfits [m³], or pressure misfits [Pa]."""
@@ -80,11 +80,11 @@ class System:
         self.solver = SymmetricSolver(settings.solver)
 
     def check_freedom(self, held_dofs: np.ndarray):
-        """At rest nothing else balances a load than the holders: every rigid motion must be held."""
+        """Raises SolveError unless every rigid motion is held: in equilibrium only holders balance a load."""
         checks.check_held(self.nodes, held_dofs)
 
     def build_surface(self, facets: Facets):
-        """Tables of the boundary, as contact reads them."""
+        """Tables of the boundary for the contact kernel."""
         dofs = np.hstack([3 * facets.nodes + c for c in range(3)])
         penalty = self.settings.penalty * self.problem.material.mu / np.sqrt(facets.weights.sum(axis=1))
         positions = self.pattern.positions(dofs)
@@ -132,22 +132,23 @@ class System:
         return obstacles.place(self.rows, self.problem.obstacles, t)
 
     def filling_at(self, t: float, load: float):
-        """What the cavities are wanted to hold at time t, see Loads."""
+        """Targets of the cavities at time t, see Loads.filling."""
         return np.array([lumen.target(t, load) for lumen in self.lumens])
 
     def starts_loaded(self):
-        """Whether something is to be switched on at the start, before time runs: a force, or a cavity's content."""
+        """Whether a force or the content of a cavity has to be applied at the start time."""
         start = self.settings.start
         return bool(np.any(self.force_at(start)) or np.any(self.filling_at(start, 1.0) != self.filling_at(start, 0.0)))
 
     def loads_of(self, state: State) -> Loads:
-        """What acts in a converged state."""
+        """The loads of a converged state."""
         rows, filling = self.obstacles_at(state.t), self.filling_at(state.t, state.load)
         force = self.force_at(state.t, state.load)
         return Loads(force, rows, state.multiplier, filling, state.stiffness, grip=state.grip, faces=state.faces)
 
     def held_at(self, t: float):
-        """Prescribed values of the held unknowns at time t; refuses regions that contradict each other."""
+        """Prescribed values of the held unknowns at time t. Raises SolveError for regions that contradict each
+        other."""
         target = np.full(self.field_count, np.nan)
         for k, held in enumerate(self.held):
             value, there = held.displacement(t), target[held.dofs]

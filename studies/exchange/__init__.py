@@ -1,1 +1,1 @@
-"""Scenes for programs of others, and what these hand in: written as plain files, judged as our own runs are."""
+"""Export of scenes for other programs as plain files, and evaluation of their results in the same way as our runs."""

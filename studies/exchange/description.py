@@ -27,12 +27,12 @@ from studies.scene.quantities import allowed
 from studies.scene.scene import Scene
 
 SCHEMA, VERSION = "organbench-scene", 1
-"""Raised when a reader of the old one would misread the new one."""
+"""VERSION increases when a reader of the old format would misread the new one."""
 OURS = (
     *("alternation", "step_time", "frame_time", "frame_time_p99"),
     *("cut_energy", "cut_momentum", "cut_limit", "cut_ms"),
 )
-"""Metrics of what is inside of this program alone."""
+"""Metrics that only apply inside this program."""
 OF_CUTS = ("overlap", "piece_worst", "piece_sum_worst")
 """Metrics of organs that are cut."""
 HELD, OUTER, LUMEN = "held_", "outer", "lumen"
@@ -42,7 +42,7 @@ CUT_FILES = {"straight": "cut_straight.csv", "curved": "cut_curved.csv"}
 
 
 def judged_metrics(scene: Scene) -> list[Metric]:
-    """What an entry in this scene is judged by."""
+    """The metrics for an entry in this scene."""
     left_out = OURS if scene.cut is not None else (*OURS, *OF_CUTS)
     metrics = [metric for metric in METRICS if metric.name not in left_out]
     return [m for m in metrics if m.quantity is None or allowed(scene, m.quantity)]

@@ -1,4 +1,4 @@
-"""An entry from outside as a record like those of our own runs, stored under its own name and read back."""
+"""External entries as records in the same form as our runs: storage under the name of the entry, and loading."""
 
 import json
 from collections.abc import Callable, Iterable
@@ -25,14 +25,14 @@ from studies.store.paths import readable, record_files, record_path
 from studies.store.record import Record, read_record
 
 FOLDER = "entries"
-"""Of the results."""
+"""Folder of entries in the results."""
 ENTRY, SECONDS = "entry", "entry_seconds"
 """Attributes of its record."""
 
 
 @dataclass(frozen=True)
 class Outside(Method):
-    """What another program did; it cannot be run here. Each entry is a class of its own, for its name."""
+    """The method of an external entry, which cannot be run here. Each entry has a separate class, for its name."""
 
     name: ClassVar[str] = "outside"
     order: ClassVar[int] = 0
@@ -84,7 +84,8 @@ def case_of_entry(record: Record) -> Case:
 
 
 def run_of_entry(record: Record, reference: Reference | None) -> Run:
-    """An entry with what it is judged by; reference: that of its scene, of a cut one before the cut too."""
+    """The run of an entry; reference: that of its scene, which for a cut scene may include checkpoints before the
+    cut."""
     seconds = record.attributes.get(SECONDS)
     timing = None
     if seconds is not None:
@@ -102,8 +103,8 @@ def entry_files(root: Path) -> list[Path]:
 def entries_beside(
     root: Path, scenes: Iterable[Scene], reference_for: Callable[[Scene], Reference | None]
 ) -> tuple[list[Run], list[str]]:
-    """The entries in `scenes`, judged by the references of these; and what cannot be read, a sentence each. A scene is
-    the same whatever its reference's meshes and its number of frames."""
+    """The entries in `scenes`, judged by the references of these; and what cannot be read, a sentence each. Scenes that
+    differ only in the meshes of the reference or the number of frames count as the same."""
     pairs = {_same(given): (given, scene) for scene in scenes for given in _given(scene)}
     runs, problems = [], []
     for path in entry_files(root):
@@ -124,7 +125,7 @@ def entries_beside(
 def _given(scene: Scene) -> list[Scene]:
     try:
         return [given_scene(scene)]
-    except StudyError:  # nobody was given it
+    except StudyError:  # it was never exported
         return []
 
 

@@ -21,9 +21,9 @@ from studies.scene.scene import Scene
 
 DESCRIPTION, README = "scene.json", "README.md"
 SOFA = Path(__file__).parent / "peers" / "sofa_scene.py"
-"""Handed out as it is."""
+"""Adapter that is exported unchanged."""
 DIGITS = 12
-"""Of a number: 3.6 and not 3.5999999999999996."""
+"""Significant digits of exported numbers: 3.6 and not 3.5999999999999996."""
 
 
 def export(scene: Scene, folder: Path, nodes: int, rows: Sequence[Sequence[str]] = ()) -> tuple[list[Path], str]:

@@ -1,4 +1,4 @@
-"""Whether what was handed in fits the scene: the same mesh, node by node, in metres, at every checkpoint."""
+"""Checks that a submitted result fits the scene: the same mesh, node by node, in metres, at every checkpoint."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,11 +14,11 @@ from studies.geometry.files.units import NAMES, UNITS
 from studies.scene.scene import Scene
 
 SAME = 1e-6
-"""Of the body: rest positions that differ by less are the same, though stored as 32-bit floats."""
+"""Largest difference of equal rest positions, over the size of the body; allows for storage as 32-bit floats."""
 FAR = 20.0
-"""Sizes of the body that no node of a scene moves: steps beyond are in another unit, or the body has burst."""
+"""Displacement, in sizes of the body, beyond which positions are in another unit or the body has burst."""
 SAME_TIME = 1e-6
-"""Of the scene's duration."""
+"""Largest difference of equal times, over the duration of the scene."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,7 +35,7 @@ class Fitting:
 
 
 def fitted(handed: Handed, scene: Scene, meshes: Sequence[GivenMesh]) -> Fitting:
-    """What was handed in, on the mesh that it is of. Raises StudyError, in a sentence, for what does not fit."""
+    """The submitted steps with their mesh. Raises StudyError for data that do not fit the scene."""
     name, x = handed.name, handed.positions
     if x.ndim != 3 or x.shape[2] != 3:
         raise StudyError(f"{name}: positions have shape {x.shape}; they must be (steps, nodes, 3)")

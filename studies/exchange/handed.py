@@ -1,4 +1,4 @@
-"""What another program hands in, read from its file as it stands."""
+"""Reads the results of another program from its files, without interpretation."""
 
 import re
 import xml.etree.ElementTree as ElementTree
@@ -17,23 +17,23 @@ from studies.base.errors import StudyError
 from studies.geometry.files.grids import SUFFIX, read_points
 
 DISPLACEMENT = "displacement"
-"""Point data of a grid that stands still."""
+"""Point data with displacements, for a grid whose points are those at rest."""
 OPTIONAL = ("force", "pressure", "lumen_pressure")
 """Histories that an npz file may hold besides the positions, one number for each step."""
 
 
 @dataclass(frozen=True, eq=False)
 class Handed:
-    """Steps of a body, as its file has them."""
+    """Steps of a body, as in its file."""
 
     name: str
-    """Of the file."""
+    """Name of the file."""
     t: np.ndarray | None
     """[s], (F,); None where the file has no times."""
     positions: np.ndarray
     """[m], (F, n, 3)."""
     histories: dict[str, np.ndarray]
-    """Of OPTIONAL what there is, (F,) each."""
+    """Histories of OPTIONAL that are present, (F,) each."""
 
 
 def read_handed(path: Path) -> Handed:
@@ -165,7 +165,7 @@ def _of_grids(name: str, grids: Sequence[tuple[np.ndarray, dict[str, np.ndarray]
 
 
 def _stacked(name: str, points: Sequence[np.ndarray], moved: Sequence[np.ndarray | None]) -> np.ndarray:
-    """Positions of all steps: the points, or where these stand still, points and displacements."""
+    """Positions of all steps: the points, or if these are constant, points plus displacements."""
     if len({rows.shape for rows in points}) > 1:
         raise StudyError(f"{name}: the number of nodes changes from step to step; hand in one mesh that moves")
     still = all(np.array_equal(rows, points[0]) for rows in points)
@@ -188,7 +188,7 @@ UNREADABLE = (
     BadZipFile,
     zlib.error,
 )
-"""What readers raise for files that are damaged or hold something else."""
+"""Exceptions of readers for damaged files, or files of another kind."""
 READERS: dict[str, Callable[[Path], Handed]] = {
     ".npz": _read_npz,
     ".csv": _read_csv,
@@ -196,4 +196,4 @@ READERS: dict[str, Callable[[Path], Handed]] = {
     ".hdf": _read_vtkhdf,
     ".pvd": _read_pvd,
 }
-"""By suffix."""
+"""Reader by suffix."""

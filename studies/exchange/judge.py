@@ -1,5 +1,5 @@
-"""Judges what another program computed: volumes, elements and contacts are measured as in our own runs, and the same
-metrics read the record."""
+"""Evaluates the results of another program: volumes, elements and contacts are measured as in our runs, and the same
+metrics use the record."""
 
 import hashlib
 from pathlib import Path
@@ -32,11 +32,11 @@ STILL = "the body did not move"
 def entry_record(
     scene: Scene, path: Path, name: str, nodes: int, force: Path | None = None, seconds: float | None = None
 ) -> Record:
-    """The record of what another program handed in.
+    """The record of the results of another program.
 
     path: as handed.read_handed takes it; name: of the entry; nodes: vertices on the outer surface with which the scene
     was exported; force: a CSV file with the probed force; seconds: computing time for a simulated second [s/s].
-    Raises StudyError for whatever does not fit the scene.
+    Raises StudyError for anything that does not fit the scene.
     """
     method, scene = outside(name), given_scene(scene)
     if seconds is not None and not 0.0 < seconds < np.inf:
@@ -63,7 +63,7 @@ def entry_record(
 
 
 def measured(fitting: Fitting) -> dict[str, np.ndarray]:
-    """The fields of a record: what a run records of itself, read off the positions."""
+    """The fields of a record, computed from the positions."""
     mesh, t, x = fitting.mesh, fitting.t, fitting.positions
     scene, body, steps = mesh.scene, mesh.body, len(fitting.t)
     at = [int(np.argmin(np.abs(t - checkpoint))) for checkpoint in scene.checkpoints]
@@ -108,7 +108,8 @@ def _depth(obstacle: Obstacle, x: np.ndarray, surface: np.ndarray, triangles: np
 
 
 def _forces(scene: Scene, force: np.ndarray | None, steps: int) -> dict[str, np.ndarray]:
-    """The probed force along its direction; unknown where none was handed in, and so are the others."""
+    """Contact and held forces with the probed force along its direction; all others, and the probed one if none was
+    submitted, are NaN."""
     contact, held = (np.full((steps, len(things), 3), np.nan) for things in (scene.obstacles, scene.held))
     if force is not None:
         direction = np.asarray(scene.probed.direction)
@@ -147,7 +148,7 @@ def _has_moved(fitting: Fitting) -> bool:
 
 
 def _sway(fitting: Fitting, values: dict[str, np.ndarray]) -> dict[str, float]:
-    """How much the force sways at the end, where it is known."""
+    """The variation of the force at the end; NaN if unknown."""
     if "force" not in fitting.histories:
         return {}
     return {"sway": sway(fitting.mesh.scene, values["t"], values["contact_force"], values["held_force"])}
@@ -159,7 +160,7 @@ def _named(path: Path, fitting: Fitting) -> str:
 
 
 def unfinished_record(case: Case, status: Status, message: str) -> Record:
-    """The record of an entry that handed nothing in: status and message say why."""
+    """The record of an entry without results; `status` and `message` give the reason."""
     return new_record(
         kind="run",
         key=case.key,

@@ -1,4 +1,4 @@
-"""The meshes on which positions are handed in: the straight and the curved one of a scene's organ."""
+"""The meshes on which results are submitted: the straight and the curved one of a scene's organ."""
 
 import hashlib
 from dataclasses import dataclass, field
@@ -23,9 +23,9 @@ from studies.scene.scene import Scene
 
 STRAIGHT, CURVED = "straight", "curved"
 NODES = 550
-"""Vertices on the outer surface where nobody says how many."""
+"""Default number of vertices on the outer surface."""
 GRAIN = 1e-7
-"""To which rest positions are rounded before they are hashed [m]: far above rounding errors, far below an edge."""
+"""Rounding of rest positions before they are hashed [m]: far above round-off, far below an edge."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,7 +70,7 @@ class GivenMesh:
 
     @cached_property
     def volumes(self) -> Volumes:
-        """What is measured: the volume of the tissue or of each of its pieces, and that of a lumen that is filled."""
+        """The measured volumes: that of the tissue or of each of its pieces, and that of a filled lumen."""
         if self.scene.cuts:
             cells = self.body.tetrahedra.astype(np.int64)
             piece = pieces_of(self.points, cells)

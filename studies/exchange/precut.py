@@ -1,5 +1,5 @@
-"""A scene that cuts its organ, for programs that cannot: its mesh is cut from the start, and only what comes after the
-cut is judged.
+"""Scenes with a cut for programs that cannot cut: the mesh is cut from the start, and only checkpoints after the cut
+count.
 
 The tissue has no memory, so an equilibrium after the cut does not depend on when it was made.
 """
@@ -15,10 +15,10 @@ from studies.store.schema import REFERENCE_FIELDS
 
 
 def given_scene(scene: Scene) -> Scene:
-    """The scene as another program gets it: of one with a cut, the checkpoints after it alone.
+    """The scene for another program; for a scene with a cut, only with the checkpoints after it.
 
-    Raises StudyError for a cut whose time matters: one in a scene without equilibria, one that lets a piece go, or one
-    that opens a lumen; for several cuts, and for one after which there is no checkpoint.
+    Raises StudyError for a cut whose time matters: one in a scene without equilibria, one that allows free pieces, or
+    one that opens a lumen; for several cuts, and for one after which there is no checkpoint.
     """
     if len(scene.cuts) > 1:
         raise StudyError(

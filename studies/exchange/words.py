@@ -1,4 +1,4 @@
-"""A scene in closed words: what its numbers mean, for somebody who has never run this program."""
+"""Descriptions of a scene in words, for readers who have never run this program."""
 
 from massspring import Capsule, Obstacle, Plane, Ramp, Sphere, Trajectory
 from studies.scene.cut import Cut

@@ -1,6 +1,6 @@
 """Meshes of organs: gmsh and meshio live here only. Lengths in metres, surface nodes numbered first.
 
-The public names are those of the stub, `__init__.pyi`; a name loads its module when it is first used.
+The public names are those in the stub `__init__.pyi`. Each name loads its module on first use.
 """
 
 import lazy_loader

@@ -1,1 +1,1 @@
-"""Meshes finer where a scene holds and touches the body, for references and for bodies."""
+"""Meshes that are finer where a scene holds and touches the body, for references and bodies."""

@@ -1,4 +1,5 @@
-"""Which faces of a cut are open while it advances: at each stage the surface of the body stays one that can be."""
+"""Which faces of a cut are open while it advances, so that at each stage the surface of the body is a valid closed
+surface."""
 
 from collections.abc import Sequence
 
@@ -7,18 +8,18 @@ import numpy as np
 from studies.geometry.mesh.organ_mesh import row_keys
 
 JUST = 1e-9
-"""Of the way of a front: a node that lies on it has been passed."""
+"""Tolerance over the length of the path of a front: a node that lies on the front counts as passed."""
 
 
 def faces_in_stages(
     faces: np.ndarray, parting: np.ndarray, along: np.ndarray, shares: Sequence[float]
 ) -> list[np.ndarray]:
-    """The faces of a cut (f, 3) that are open once its front has gone each of the ascending `shares` (s,) of its way,
-    (f,) bool each, with no face shut again.
+    """The faces of a cut (f, 3) that are open once its front has covered each of the ascending `shares` (s,) of its
+    path, (f,) bool each; no face closes again.
 
-    The front goes from the first to the last of the nodes that are `parting` (n,) bool, those that the whole cut
-    doubles, by their position `along` (n,) its direction; a node parts when the front passes it, and with it all faces
-    around it open. A node waits where the surface of the opened body would meet itself in a point or an edge.
+    The front moves over the nodes `parting` (n,) bool, those that the whole cut doubles, in the order of their position
+    `along` (n,) its direction. When it passes a node, the node is doubled and all faces around it open. A node waits if
+    the surface of the opened body would touch itself in a point or an edge.
     """
     first, last = along[parting].min(), along[parting].max()
     passed = np.zeros(len(parting), dtype=bool)
@@ -31,8 +32,8 @@ def faces_in_stages(
 
 
 def parted(faces: np.ndarray, parting: np.ndarray, before: np.ndarray, reached: np.ndarray) -> np.ndarray:
-    """The nodes that part, (n,) bool: those of the stage `before` (n,), and of those that are `reached` (n,) all that
-    need not wait."""
+    """The doubled nodes, (n,) bool: those of the stage `before` (n,), and all of those `reached` (n,) that need not
+    wait."""
     while True:
         passed = reached | (parting & ~_corners(faces[~reached[faces].any(axis=1)], len(parting)))
         bad = meetings(faces, parting, passed)
@@ -51,16 +52,15 @@ def _corners(rows: np.ndarray, n: int) -> np.ndarray:
 
 
 def meetings(faces: np.ndarray, parting: np.ndarray, passed: np.ndarray) -> np.ndarray:
-    """Nodes at which the surface of the body would meet itself once those that were `passed` (n,) have parted, (n,)
-    bool.
+    """Nodes at which the surface of the body would touch itself if the nodes `passed` (n,) were doubled, (n,) bool.
 
-    Around a node that is still one the open faces of the cut are one fan; of a node of the outline they are fans that
-    each begin at the outline. A side between two such nodes has one open face, and is not in the outline."""
+    In a valid state the open faces around a single node form one fan, or around a node of the outline fans that each
+    begin at the outline. A side between two single nodes has at most one open face, and is not in the outline."""
     n, is_open = len(passed), passed[faces].any(axis=1)
     half = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
     _, place, inverse, count = np.unique(row_keys(half), return_index=True, return_inverse=True, return_counts=True)
     sides, opened = half[place], np.bincount(inverse.ravel(), np.repeat(is_open, 3)).astype(int)
-    # The other sides with one face are the front of the whole cut, whose nodes stay one.
+    # The other sides with one face are the front of the whole cut, whose nodes stay single.
     outline = (count == 1) & parting[sides].any(axis=1)
     still = ~passed[sides].any(axis=1)
     bad = np.zeros(n, dtype=bool)

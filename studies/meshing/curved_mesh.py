@@ -12,9 +12,10 @@ from studies.meshing.shaping import moved, upright_against
 
 
 def curved_mesh(mesh: OrganMesh, shape: Shape | None = None) -> CurvedMesh:
-    """`studies.geometry.curved`; where an element would fold, sides are held back, and a warning tells how far.
+    """`studies.geometry.curved`, but where an element would fold, its sides are curved less, and a warning states the
+    deviation.
 
-    shape: of a scan, whose recipe does not tell it. Raises StudyError as that does.
+    shape: the true shape of a scan, which its recipe does not contain. Raises StudyError as `studies.geometry.curved`.
     """
     target = curved(mesh, may_fold=True, shape=shape)
     if target.smallest_jacobian > 0.0:

@@ -1,4 +1,4 @@
-"""The mesh of a body that is finer where its scene holds and touches it, with a wanted number of surface nodes."""
+"""Graded meshes of bodies: finer where the scene holds and touches the body, with a given number of surface nodes."""
 
 from itertools import count
 
@@ -17,36 +17,37 @@ from studies.scene.organ_file import remeshed
 from studies.scene.scene import Scene
 
 SOLID, HOLLOW = (1, 2), (0, 1)
-"""Times that elements are halved at outlines and at contacts (measured: docs/accuracy.md). The wall of a stomach is
-thin everywhere and gains from contacts alone."""
+"""How often elements are halved at outlines and at contacts (measured: docs/accuracy.md). The wall of a stomach is thin
+everywhere, so only halving at contacts helps."""
 MIDDLE, DRAWN, HUNG = 0.5, 0.4, 0.45
-"""Where the middle of a side stands that leaves an outline, as a share of its length from there: near it displacement
-goes as √r where strains are small. What hangs by its outline is strained so much there that sides drawn to 0.4 turn
-elements inside out (docs/accuracy.md). Three sides drawn leave (4 share − 1)³ of the Jacobian at the outline, 0.22 and
-0.51; below a share of 0.37 that is less than studies.meshing.retreat allows."""
+"""Positions of the mid-side node of a side that starts at an outline, as a share of its length from there. MIDDLE: no
+shift; DRAWN: towards the outline, since displacement varies as √r near it where strains are small; HUNG: for organs
+that hang by their outline, where strains are so large that 0.4 inverts elements (docs/accuracy.md). With three shifted
+sides (4 share − 1)³ of the Jacobian remains at the outline, 0.22 and 0.51; below a share of 0.37 that is less than
+studies.meshing.retreat allows."""
 CLOSE, TOLERANCE = 0.03, 0.05
 """Deviation from the wanted number of nodes at which the search stops, and beyond which it has failed."""
 TRIES, MOST_TRIES = 10, 20
-"""After so many the search ends with what is within TOLERANCE, and goes on to the second number where nothing is."""
+"""Number of tries after which the search ends if a result is within TOLERANCE, and after which it ends in any case."""
 
 
 def usual_grading(scene: Scene) -> tuple[int, int]:
-    """Times that elements are halved at outlines and at contacts of a scene's organ."""
+    """How often elements are halved at outlines and at contacts of a scene's organ."""
     return HOLLOW if is_hollow(scene) else SOLID
 
 
 def graded_mesh(
     scene: Scene, nodes: int, at_outlines: int, at_contact: int, quadratic: bool
 ) -> OrganMesh | QuadraticMesh:
-    """The scene's organ with `nodes` nodes on its outer surface (within 5 %; mid-side nodes count), elements halved
-    `at_outlines` times at the outlines of held regions and `at_contact` times where obstacles will be.
+    """The scene's organ with `nodes` nodes on its outer surface (within 5 %; mid-side nodes count), with elements
+    halved `at_outlines` times at the outlines of held regions and `at_contact` times where obstacles will touch.
 
-    A mesh file that comes as it is has its own number of nodes and is halved all the same. The wall of a hollow organ
+    A mesh file that is used unchanged keeps its number of nodes and is halved too. The wall of a hollow organ
     has one layer. Raises StudyError for a mesh that cannot be made.
     """
     if not remeshed(scene.organ):
         return mesh_at(scene, nodes, at_outlines, at_contact, quadratic)
-    # Counts hardly depend on where nodes lie, and even ones are quick to make.
+    # The counts hardly depend on the positions of the nodes, and evenly spread nodes are quick to compute.
     level = coarse_level(scene, nodes, at_outlines, at_contact, quadratic, even=True)
     level = coarse_level(scene, nodes, at_outlines, at_contact, quadratic, start=level)
     return mesh_at(scene, level, at_outlines, at_contact, quadratic)
@@ -61,7 +62,8 @@ def mesh_at(scene: Scene, level: int, at_outlines: int, at_contact: int, quadrat
 
 
 def middles(scene: Scene) -> float:
-    """Where the middles of sides stand that leave an outline of the scene's held regions (DRAWN)."""
+    """Share at which mid-side nodes of sides that start at an outline of the scene's held regions are placed (see
+    DRAWN)."""
     if not scene.held and not scene.cuts:
         return MIDDLE
     return HUNG if load_of(scene) == "sag" else DRAWN
@@ -70,8 +72,8 @@ def middles(scene: Scene) -> float:
 def halved(
     scene: Scene, level: int, at_outlines: int, at_contact: int, on_shape: bool = False, even: bool = False
 ) -> tuple[OrganMesh, HeldMesh, HeldMesh]:
-    """The organ's mesh, the same with where it is held, and that one halved; all with straight sides, whose vertices
-    are `on_shape` for sides that will be curved, or `even` (studies.meshing.scene_mesh.mesh_for)."""
+    """The organ's mesh, its HeldMesh, and the halved HeldMesh, all with straight sides. `on_shape` and `even` as in
+    studies.meshing.scene_mesh.mesh_for."""
     organ_mesh = mesh_for(scene, level, layers=1 if is_hollow(scene) else None, on_shape=on_shape, even=even)
     coarse = held_mesh(scene, organ_mesh)
     fine = coarse.refined(scene, at_outlines, at_contact)
@@ -95,8 +97,8 @@ def coarse_level(
     start: int | None = None,
     even: bool = False,
 ) -> int:
-    """Surface vertices before halving that end in `nodes` nodes on the outer surface, near `start` where given; `even`:
-    of a mesh whose nodes are evenly spread. Raises StudyError."""
+    """Number of surface vertices before halving that leads to `nodes` nodes on the outer surface, near `start` if
+    given; `even`: for a mesh with evenly spread nodes. Raises StudyError."""
     check_number(scene, nodes, quadratic)
     counts: dict[int, int] = {}
     level, failed = start or max(FEWEST, (nodes + 6) // 4 if quadratic else nodes), None
@@ -107,7 +109,7 @@ def coarse_level(
             body = halved(scene, level, at_outlines, at_contact, quadratic, even)[2]
             counts[level] = outer_nodes(body, quadratic)
         except StudyError as error:
-            failed = failed or error  # raised below, unless a neighbour of this level can be meshed
+            failed = failed or error  # raised below, unless a neighbouring level can be meshed
             level += max(1, level // 50)
             continue
         off = abs(counts[level] / nodes - 1.0)
@@ -127,7 +129,7 @@ def coarse_level(
 
 
 def check_number(scene: Scene, nodes: object, quadratic: bool) -> None:
-    """Raises StudyError for a number of surface nodes that no body can have."""
+    """Raises StudyError for an impossible number of surface nodes."""
     most = 4 * MOST - 6 if quadratic else MOST
     if isinstance(nodes, bool) or not isinstance(nodes, int | np.integer) or not FEWEST <= nodes <= most:
         raise StudyError(
@@ -141,18 +143,18 @@ def _best(counts: dict[int, int], nodes: int) -> int:
 
 
 def _off(counts: dict[int, int], nodes: int) -> float:
-    """Smallest deviation found, over the wanted number."""
+    """Smallest deviation found from the wanted number, over that number."""
     return abs(counts[_best(counts, nodes)] / nodes - 1.0)
 
 
 def _untried(level: int, counts: dict[int, int]) -> int:
-    """The nearest level that was not tried: neighbours end in numbers of nodes that jump."""
+    """The nearest level that was not tried, since the resulting number of nodes varies irregularly."""
     step = max(1, level // 50)
     near = (level + sign * k * step for k in count(1) for sign in (1, -1))
     return next(other for other in near if other >= FEWEST and other not in counts)
 
 
 def outer_nodes(body: HeldMesh, quadratic: bool) -> int:
-    """Nodes on the outer surface, mid-side nodes among them where there are any."""
+    """Number of nodes on the outer surface, including mid-side nodes if there are any."""
     facets = all_facets(body)[-2]
     return len(set((facets if quadratic else facets[:, :3]).ravel().tolist()))

@@ -1,4 +1,4 @@
-"""A tetrahedral mesh that knows where it is held, and finer ones of the same straight sides."""
+"""A tetrahedral mesh with its held regions and cuts, and its refinement by halving straight-sided elements."""
 
 import logging
 from dataclasses import dataclass, field, replace
@@ -16,23 +16,24 @@ from studies.meshing.scene_mesh import patch_nodes
 from studies.scene.scene import Scene
 
 SAME_POINT = 1e-9
-"""Two points closer than this fraction of the body are one: far above rounding, far below an edge."""
+"""Fraction of the size of the body below which two points coincide: far above round-off, far below an edge."""
 
 
 @dataclass(frozen=True, eq=False)
 class HeldMesh:
-    """A mesh with straight sides, and where on its surface it is held."""
+    """A mesh with straight sides, with its held regions, lumen and cuts."""
 
     mesh: MeshTet
     corners: np.ndarray
     """Vertices before any refinement [m], (n, 3)."""
     patches: list[np.ndarray]
-    """Of each held region and last of the lumen: its triangles of `corners`, (f, 3). A finer mesh has parts of them."""
+    """Triangles of each held region, and last of the lumen, by `corners`, (f, 3). The facets of a finer mesh are parts
+    of them."""
     cuts: list[np.ndarray] = field(default_factory=list)
-    """Of each of the scene's cuts its faces between tetrahedra of `corners`, (f, 3), seen from in front of it."""
+    """Faces of each of the scene's cuts between tetrahedra, by `corners`, (f, 3), seen from in front of the cut."""
 
     def facets(self, mesh: MeshTet2) -> list[np.ndarray]:
-        """Of each patch the six nodes of its facets (f, 6) in the second-order mesh with the same vertices."""
+        """For each patch the six nodes of its facets, (f, 6), in the second-order mesh with the same vertices."""
         table, reach = facet_nodes(mesh), SAME_POINT * float(np.ptp(self.corners))
         middles = self.mesh.p.T[table[:, :3]].mean(axis=1)
         return [
@@ -50,14 +51,14 @@ class HeldMesh:
             faces = np.asarray(self.mesh.facets).T[inner].astype(np.int64)
             faces = faces[distance_to_surface(x[faces].mean(axis=1), self.corners, cut) < reach]
             normals = triangle_normals(x, faces)
-            # A sheet is flat: faces that stand across it have their middle beside it.
+            # A cut is flat: faces across it have their centre off the plane.
             normal = triangle_normals(self.corners, cut[:1])[0]
             by_cut.append(np.where((normals @ normal < 0)[:, None], faces[:, ::-1], faces))
         return by_cut
 
     @property
     def cut_faces(self) -> np.ndarray:
-        """The same of all cuts together."""
+        """The faces of all cuts together, (f, 3)."""
         return np.concatenate([np.empty((0, 3), np.int64), *self.faces_of_cuts])
 
     @cached_property
@@ -83,7 +84,7 @@ class HeldMesh:
         return np.flatnonzero(np.isin(self.mesh.t, np.concatenate([*rims, []])).any(axis=0))
 
     def inside(self, obstacles: tuple[Obstacle, ...], t: float) -> np.ndarray:
-        """Boundary elements with a vertex that at rest is where an obstacle will be at time t [s]."""
+        """Boundary elements with a vertex whose rest position is inside an obstacle at time t [s]."""
         outer = np.unique(boundary_triangles(self.mesh.t.T))
         x = self.mesh.p[:, outer].T
         deep = np.zeros(len(x), dtype=bool)
@@ -92,11 +93,11 @@ class HeldMesh:
         return np.flatnonzero(np.isin(self.mesh.t, outer[deep]).any(axis=0))
 
     def bisected(self, elements: np.ndarray) -> "HeldMesh":
-        """Each of the elements halved at its longest edge, and of their neighbours as many as that takes."""
+        """The mesh with each of the elements halved at its longest edge, and as many neighbours as that requires."""
         return self.halved(elements)[0]
 
     def halved(self, elements: np.ndarray) -> tuple["HeldMesh", np.ndarray]:
-        """The same, and for each new element the number of the old one that it is, or is a part of."""
+        """The same, and for each new element the number of the old one of which it is a part."""
         rounds: list[np.ndarray] = []
 
         class Recording(MeshTet):
@@ -106,7 +107,7 @@ class HeldMesh:
 
         talk = logging.getLogger("skfem.mesh.mesh")
         before = talk.level
-        talk.setLevel(logging.ERROR)  # it tells that its own slices are copied
+        talk.setLevel(logging.ERROR)  # scikit-fem warns that it copies slices
         try:
             finer = Recording(self.mesh.p, self.mesh.t).refined(elements)
         finally:
@@ -117,8 +118,8 @@ class HeldMesh:
         return replace(self, mesh=MeshTet(np.ascontiguousarray(finer.p), np.ascontiguousarray(finer.t))), parents
 
     def refined(self, scene: Scene, at_outlines: int, at_contact: int) -> "HeldMesh":
-        """Halved so many times at the outlines, then at the surface that an obstacle of the scene will have reached at
-        its last checkpoint."""
+        """The mesh halved `at_outlines` times at the outlines, then `at_contact` times at the surface that obstacles of
+        the scene reach by the last checkpoint."""
         finer = self
         for _ in range(at_outlines):
             finer = finer.bisected(finer.at_outlines())
@@ -136,12 +137,12 @@ def held_mesh(scene: Scene, organ_mesh: OrganMesh) -> HeldMesh:
 
 
 def straight(organ_mesh: OrganMesh) -> MeshTet:
-    """The tetrahedra as scikit-fem knows them."""
+    """The tetrahedra as a scikit-fem mesh."""
     return MeshTet(np.ascontiguousarray(organ_mesh.points.T), np.ascontiguousarray(organ_mesh.tetrahedra.T))
 
 
 def with_patches(mesh: MeshTet, patches: list[np.ndarray]) -> HeldMesh:
-    """A mesh that is held at the boundary facets whose vertices are all in one of the patches."""
+    """A HeldMesh whose patches are the boundary facets with all vertices in a set of `patches`."""
     outer = boundary_triangles(mesh.t.T)
     return HeldMesh(mesh, mesh.p.T.copy(), [outer[np.isin(outer, patch).all(axis=1)] for patch in patches])
 

@@ -1,4 +1,4 @@
-"""How well a body at rest keeps the shape of its organ and the area where it is held: a warning where it does not."""
+"""Warnings if a body at rest deviates too much from the shape of its organ or from the area of a held region."""
 
 import warnings
 from collections.abc import Callable
@@ -20,20 +20,20 @@ from studies.scene.organ_file import remeshed
 from studies.scene.scene import Held, Organ, Scene
 
 TOUCHED = 0.6
-"""Facets that touch a probe at the end over those that at rest are where it will be: .5 to .8 of 40 pressed livers and
-stomachs; in Hertz's contact half of the area."""
+"""Facets that touch a probe at the end over those whose rest position is inside its final position: 0.5 to 0.8 for 40
+pressed livers and stomachs; in Hertz's contact half of the area."""
 FINER = 1.08
-"""Ratio of the vertices of meshes that are tried for one that keeps the area of all held regions: a mesh may cut off an
-end where the organ is held, and the next finer one not."""
+"""Ratio of the numbers of vertices of successive meshes in the search for one that keeps the area of all held regions:
+one mesh may cut off a held end of the organ, and the next finer one not."""
 
 
 def tell_shape(scene: Scene, mesh: OrganMesh | QuadraticMesh, filled: bool) -> None:
-    """Warns, in one sentence, of a body beyond the bounds of studies.meshing.bounds. filled: whether the tissue alone
-    is in it; otherwise it is the outer surface.
+    """Warns, in one sentence, of a body beyond the bounds of studies.meshing.bounds. filled: whether the body is the
+    tissue; otherwise it is what the outer surface encloses.
 
-    Raises StudyError for one that holds far too little or too much of a held region."""
+    Raises StudyError if the area of a held region deviates by more than REFUSED_AREA."""
     faults = []
-    # The triangles of a file that come as they are have its shape.
+    # Triangles of a file that is used unchanged have its exact shape.
     if remeshed(scene.organ):
         facets = mesh.facets if isinstance(mesh, QuadraticMesh) else mesh.triangles if filled else mesh.outer_triangles
         errors = shape_errors(scene.organ, rest_surfaces(mesh.points, facets), filled)
@@ -62,8 +62,8 @@ def tell_shape(scene: Scene, mesh: OrganMesh | QuadraticMesh, filled: bool) -> N
 
 
 def touched_facets(scene: Scene, mesh: OrganMesh | QuadraticMesh) -> float | None:
-    """About how many outer facets a moving sphere or capsule will touch at the last checkpoint, the fewest of all; None
-    without one."""
+    """Estimated number of outer facets that a moving sphere or capsule touches at the last checkpoint, the smallest
+    over all of them; None without one."""
     probes = [one for one in scene.obstacles if isinstance(one, Sphere | Capsule) and top_speed(one.path) > 0]
     if not probes or not scene.checkpoints:
         return None
@@ -82,7 +82,7 @@ def held_area_error(scene: Scene, mesh: OrganMesh | QuadraticMesh, held: Held) -
 
 def area_error(organ: Organ, held: Held, points: np.ndarray, facets: np.ndarray) -> float:
     """Area of `facets` (f, 3 or 6) between `points` (n, 3) [m] over that of the held region on the true surface, less 1
-    [1]; NaN where that is not known, or the region is off the surface: the run tells that."""
+    [1]; NaN if that is unknown, or if the region is off the surface, which the run reports."""
     truth = true_surface(organ)
     area = 0.0 if truth is None else region_area(held.region, *truth.sides[OUTER])
     if not area > 0.0:
@@ -91,15 +91,15 @@ def area_error(organ: Organ, held: Held, points: np.ndarray, facets: np.ndarray)
 
 
 def level_that_holds(level: int, most: int, lost: Callable[[int], float], bound: float) -> int:
-    """Of the levels from `level` on, each finer by FINER, up to `most` the first that has at most `bound` `lost`; where
-    none has, the one with the least. Raises StudyError, the first one, where none can be meshed."""
+    """The first level from `level` to `most`, in steps by the factor FINER, with `lost(level)` of at most `bound`; if
+    there is none, the level with the least. Raises the first StudyError if no level can be meshed."""
     losses, failed = list[tuple[float, int]](), list[StudyError]()
     while level <= most or not (losses or failed):
         try:
             losses.append((lost(level), level))
             if losses[-1][0] <= bound:
                 return level
-        except StudyError as error:  # a neighbour of this level may be meshed
+        except StudyError as error:  # a neighbouring level may be meshable
             failed.append(error)
         level = max(level + 1, round(FINER * level))
     if not losses:

@@ -1,4 +1,4 @@
-"""Nested meshes of a reference: each halves some elements of the one before and is closer to the true shape."""
+"""Nested meshes of a reference: each halves some elements of the coarser one and is nearer to the true shape."""
 
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -25,27 +25,27 @@ from studies.scene.organ_file import remeshed
 from studies.scene.scene import Scene
 
 SHARE = 0.42
-"""Where the middle of a side stands that leaves an outline, as a share of its length from there (measured,
-docs/theory.md, section 6: nearer ones overshoot once elements are small)."""
+"""Position of the mid-side node of a side that starts at an outline, as a share of its length from there (measured,
+docs/theory.md, section 6: smaller shares overshoot once elements are small)."""
 UPRIGHT = 0.05
-"""Smallest Jacobian, over that of the mean, below which the new nodes of an element go back to its parent's curve."""
+"""Smallest Jacobian over its mean below which the new nodes of an element return to the curve of its parent."""
 LEAST = 0.02
-"""The same below which an element keeps its middles where they are."""
+"""The same below which the mid-side nodes of an element are not shifted."""
 SMALLEST = 0.012
-"""Of the diagonal of the body: elements at outlines whose halves would have a smaller edge are not marked. A mesh may
-halve what is larger several times, and neighbours with it: down to a fifth of that was seen. The strain there grows
-without bound as they shrink, until a neo-Hookean element inverts and no equilibrium is found; 0.012 leaves 0.1 to 0.2 %
-of the force of the clamped ball (docs/theory.md, section 6)."""
+"""Smallest edge of marked elements at outlines, over the diagonal of the body: elements whose halves would be smaller
+are not marked. Larger ones may be halved several times, with their neighbours; edges down to a fifth of this were seen.
+The strain there grows without bound as elements shrink, until a neo-Hookean element inverts and there is no
+equilibrium. 0.012 causes an error of 0.1 to 0.2 % in the force of the clamped ball (docs/theory.md, section 6)."""
 REGULAR = 1.0 / (6.0 * np.sqrt(2.0))
 """Volume of a regular tetrahedron over the cube of its edge."""
 CHILD = 0.25
-"""Of an element's error indicator that each half of it is expected to have."""
+"""Expected error indicator of each half of an element, over that of the element."""
 LOST, MORE = 0.5 * HELD_AREA, 2.0
-"""Error of the area of a held region [%] with which the coarsest mesh is taken as it is; otherwise finer ones are
-tried, up to so many times its surface nodes. Two hanging spleens lost 5 and 6 % at 270 nodes, 0.2 and 0.3 % at 292:
-their references turned too far (docs/population.md)."""
+"""LOST: error of the area of a held region [%] up to which the coarsest mesh is accepted. Otherwise finer ones are
+tried, up to MORE times its surface nodes. Two hanging spleens lost 5 and 6 % at 270 nodes, 0.2 and 0.3 % at 292, so
+that their references turned too far (docs/population.md)."""
 GROWTH = 1.3
-"""Factor by which elements may grow at a time while marks are chosen: then the largest indicators are known again."""
+"""Factor by which the number of elements grows between two selections of the largest indicators."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,15 +54,16 @@ class NestedMesh:
 
     scene: Scene
     body: HeldMesh
-    """Its vertices before they were moved: parts of the flat elements of the coarsest mesh."""
+    """The mesh before its vertices were moved to the true shape: its elements are parts of the flat elements of the
+    coarsest mesh."""
     points: np.ndarray
-    """P2 nodes on the true shape [m], (n, 3); middles half-way."""
+    """P2 nodes on the true shape [m], (n, 3), with mid-side nodes half-way."""
     off: int = 0
-    """Boundary nodes that were put back, or elements would fold."""
+    """Number of boundary nodes that are off the true shape, since elements would fold otherwise."""
 
     @cached_property
     def mesh(self) -> MeshTet2:
-        """Middles of sides that leave an outline, or the front of a cut, are drawn to it."""
+        """The second-order mesh, with mid-side nodes shifted towards outlines and fronts of cuts."""
         flat = MeshTet2.from_mesh(self.body.mesh)
         *held, _ = self.body.facets(flat)
         outlines = np.concatenate([*(rim_sides(facets)[:, :2].ravel() for facets in held), self.body.front]).astype(int)
@@ -75,8 +76,8 @@ class NestedMesh:
         return self.opened_until(np.inf)
 
     def opened_until(self, t: float) -> tuple[MeshTet2, np.ndarray]:
-        """The mesh opened along the cuts that the scene makes before time t [s], and for each of its nodes the one of
-        `mesh` that it was, (n',). Raises StudyError."""
+        """The mesh opened along the cuts that the scene makes before time t [s], and for each of its nodes the node of
+        `mesh`, (n',). Raises StudyError."""
         ways = zip(self.scene.cuts, self.body.faces_of_cuts, strict=True)
         made = [faces for cut, faces in ways if cut.at < t]
         if not made:
@@ -85,12 +86,12 @@ class NestedMesh:
 
     @property
     def solved(self) -> MeshTet2:
-        """The mesh that is solved last: opened along all the scene's cuts."""
+        """The mesh that is solved last, opened along all cuts of the scene."""
         return self._opened[0]
 
     @property
     def parent(self) -> np.ndarray:
-        """For each node of the mesh that is solved last the one of `mesh` that it was, (n',)."""
+        """For each node of the mesh that is solved last its node in `mesh`, (n',)."""
         return self._opened[1]
 
     @cached_property
@@ -99,7 +100,7 @@ class NestedMesh:
         return [np.unique(facets) for facets in self.body.facets(self.mesh)[:-1]]
 
     def held_in(self, parent: np.ndarray) -> list[np.ndarray]:
-        """The same in an opened mesh, whose nodes were `parent` (n',)."""
+        """The same in an opened mesh; `parent` (n',): the node of `mesh` of each of its nodes."""
         return [np.flatnonzero(np.isin(parent, held)) for held in self.held]
 
     @cached_property
@@ -115,22 +116,22 @@ class NestedMesh:
 
     @property
     def lost_area(self) -> float:
-        """The largest error of the area of a held region [%]; 0 where the true area is not known."""
+        """The largest error of the area of a held region [%]; 0 if the true area is unknown."""
         *facets, _ = self.body.facets(self.mesh)
         pairs = zip(self.scene.held, facets, strict=True)
         errors = [100.0 * abs(area_error(self.scene.organ, held, self.points, some)) for held, some in pairs]
         return max((error for error in errors if error == error), default=0.0)
 
     def lumen_at(self, t: float) -> np.ndarray | None:
-        """Middles of the corners of the facets of a filled lumen [m], (f, 3); None where none is filled at time t [s]:
-        a cut lets the content go."""
+        """Middles of the corners of the facets of a filled lumen [m], (f, 3); None if it is not filled at time t [s]: a
+        cut may drain it."""
         if not self.scene.filled_at(t):
             return None
         return nodes(self.mesh)[self.body.facets(self.mesh)[-1][:, :3]].mean(axis=1)
 
     def finer(self, indicator: np.ndarray, elements: int) -> tuple["NestedMesh", np.ndarray]:
-        """A mesh of about so many elements, those halved whose indicator (ne,) is largest; and the element of this mesh
-        of which each of its elements is a part, (new ne,)."""
+        """A mesh of about `elements` elements in which those with the largest indicator (ne,) are halved; and for each
+        of its elements the element of this mesh of which it is a part, (new ne,)."""
         body, parents = marked(self.body, np.where(self.small_at_outlines, 0.0, indicator), elements)
         cells, flat = element_nodes(body.mesh), MeshTet2.from_mesh(self.body.mesh)
         owner = at_nodes(body.mesh, parents)
@@ -145,7 +146,7 @@ class NestedMesh:
 
 
 def at_nodes(mesh: MeshTet | MeshTet2, of_elements: np.ndarray) -> np.ndarray:
-    """For each P2 node the value (ne,) of one of its elements, (n,)."""
+    """For each P2 node the value of one of its elements, (n,), from values (ne,) of the elements."""
     cells = element_nodes(mesh)
     values = np.empty(int(cells.max()) + 1, dtype=of_elements.dtype)
     values[cells] = of_elements[:, None]
@@ -153,8 +154,8 @@ def at_nodes(mesh: MeshTet | MeshTet2, of_elements: np.ndarray) -> np.ndarray:
 
 
 def base_mesh(scene: Scene, surface_nodes: int, at_contact: int) -> NestedMesh:
-    """The coarsest mesh of a family: with `surface_nodes`, or up to MORE times as many where those lose area of a held
-    region. Halving brings no end of a region back, and what is held by less of it turns too far.
+    """The coarsest mesh of a family: with `surface_nodes`, or up to MORE times as many if a held region loses area.
+    Halving does not restore a lost end of a region, and an organ held by too small a region turns too far.
 
     Raises StudyError for one that cannot be made, or that still loses more than bodies may.
     """
@@ -178,7 +179,7 @@ def _base_mesh(scene: Scene, surface_nodes: int, at_contact: int) -> NestedMesh:
     body = coarse.refined(scene, 0, at_contact)
     points, shape = nodes(on_true_sides(scene, organ_mesh, coarse, body)), true_shape(scene.organ)
     if shape is not None and not smallest_jacobian(points, element_nodes(body.mesh)).min() > 0.0:
-        # An element may fold between the points where the reference integrates it: a part of it folds there too.
+        # An element may fold between its integration points; its parts would then fold at theirs.
         points = laid_out(scene, organ_mesh, coarse, body, shape)
     return NestedMesh(scene, body, points)
 
@@ -188,13 +189,13 @@ def small_at_outlines(body: HeldMesh, points: np.ndarray, least: float) -> np.nd
     if their vertices were at `points` (n, 3) [m], (ne,) bool."""
     small = edges_of(points, body.mesh.t.T) * 0.5 ** (1 / 3) < least
     there = np.zeros(body.mesh.nelements, dtype=bool)
-    if small.any():  # finding what is at outlines takes longer
+    if small.any():  # finding the elements at outlines takes longer
         there[body.at_outlines()] = True
     return there & small
 
 
 def edges_of(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
-    """Edge of the regular tetrahedron that has the volume of each of `cells` (k, 4) [m], (k,)."""
+    """Edge of the regular tetrahedron with the same volume as each of `cells` (k, 4) [m], (k,)."""
     return np.cbrt(np.abs(tetrahedron_volumes(points, cells)) / REGULAR)
 
 
@@ -209,7 +210,7 @@ def marked(body: HeldMesh, indicator: np.ndarray, elements: int, least: float = 
             break
         count = body.mesh.nelements
         room = max(1, (min(elements, int(GROWTH * count)) - count) // 3)
-        # Rounded, then by number: the last bits of an indicator differ between processors.
+        # Sorted by rounded value, then by number, since the last bits of an indicator differ between processors.
         order = np.lexsort((np.arange(count), -np.round(expected / expected.max(), 12)))
         chosen = order[: min(room, int((expected > CHILD * expected.max()).sum()))]
         body, of = body.halved(np.sort(chosen))
@@ -219,8 +220,8 @@ def marked(body: HeldMesh, indicator: np.ndarray, elements: int, least: float = 
 
 
 def upright(safe: np.ndarray, target: np.ndarray, cells: np.ndarray, least: float) -> tuple[np.ndarray, np.ndarray]:
-    """`target` (n, 3) [m] with the nodes of elements (k, 10) back at `safe` whose smallest Jacobian would be below
-    `least` and is not at `safe`; and which nodes those are."""
+    """`target` (n, 3) [m], with the nodes of those elements (k, 10) moved back to `safe` whose smallest Jacobian would
+    be below `least` but is not at `safe`; and which nodes these are."""
     back = np.zeros(len(safe), dtype=bool)
     moved = (target != safe).any(axis=1)
     while True:

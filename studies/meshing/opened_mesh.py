@@ -1,4 +1,4 @@
-"""The mesh of an organ after its cut: the same cells, their faces on the cut part of the boundary."""
+"""The mesh of an organ after its cut: the same cells, with the faces of the cut on the boundary."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -28,9 +28,9 @@ class Opened:
     """A mesh that was cut."""
 
     mesh: OrganMesh | QuadraticMesh
-    """Boundary nodes first, without cuts; the cells have the order that they had."""
+    """The opened mesh: boundary nodes first, `cuts` empty, cells in the same order as before."""
     parent: np.ndarray
-    """For each node the one it was, (n',)."""
+    """For each node its node before the cut, (n',)."""
     pairs: np.ndarray
     """Nodes behind the cut and their copies in front of it, (p, 2)."""
 
@@ -41,8 +41,8 @@ def cells_of(mesh: OrganMesh | QuadraticMesh) -> np.ndarray:
 
 
 def opened_in_stages(mesh: OrganMesh | QuadraticMesh, cuts: Sequence[Cut], shares: np.ndarray) -> list[Opened | None]:
-    """An organ's mesh opened as far as its cuts have come at each of e events; None where no face opened since the one
-    before. shares (e, c): of the way of each cut, never less than before and in the end 1; below 0 before it begins.
+    """An organ's mesh opened as far as its cuts have advanced at each of e events; None for an event without newly
+    opened faces. shares (e, c): share of the path of each cut, not decreasing and finally 1; negative before it begins.
 
     Raises StudyError for a cut that does not open it."""
     whole = opened_mesh(mesh)
@@ -58,8 +58,8 @@ def opened_in_stages(mesh: OrganMesh | QuadraticMesh, cuts: Sequence[Cut], share
 
 
 def _on_the_way(mesh: OrganMesh | QuadraticMesh, cut: Cut, parting: np.ndarray, shares: np.ndarray) -> np.ndarray:
-    """Which faces of a cut are open at each share (e,) of its way, (e, f) bool; `parting` (n,) bool: the nodes that all
-    cuts double."""
+    """Which faces of a cut are open at each share (e,) of its path, (e, f) bool; `parting` (n,) bool: the nodes that
+    all cuts double."""
     faces = mesh.cuts[cut.name]
     opens = np.repeat((shares >= 0)[:, None], len(faces), axis=1)
     moves = (shares >= 0) & (shares < 1)
@@ -71,8 +71,8 @@ def _on_the_way(mesh: OrganMesh | QuadraticMesh, cut: Cut, parting: np.ndarray, 
 
 
 def opened_mesh(mesh: OrganMesh | QuadraticMesh, along: Mapping[str, np.ndarray] | None = None) -> Opened:
-    """An organ's mesh opened along faces (f, 3) of its cuts by name (None: all of them); of a hollow one the surface
-    of the lumen is then a part of the outer one. Raises StudyError for a cut that does not open it."""
+    """An organ's mesh opened along faces (f, 3) of its cuts by name (None: all of them); for a hollow organ the surface
+    of the lumen is then part of the outer surface. Raises StudyError for a cut that does not open it."""
     along = mesh.cuts if along is None else along
     quadratic, cells = isinstance(mesh, QuadraticMesh), cells_of(mesh)
     try:
@@ -102,9 +102,9 @@ def opened_mesh(mesh: OrganMesh | QuadraticMesh, along: Mapping[str, np.ndarray]
 
 
 def opened_elements(mesh: MeshTet2, faces: np.ndarray) -> tuple[MeshTet2, np.ndarray]:
-    """A second-order mesh opened along inner `faces` (f, 3), and for each of its nodes the one it was, (n',).
+    """A second-order mesh opened along inner `faces` (f, 3), and for each of its nodes the node before, (n',).
 
-    The first vertices are those of `mesh`, the elements have the order that they had. Raises StudyError."""
+    The first vertices are those of `mesh`, the elements keep their order. Raises StudyError."""
     try:
         opening = opened(mesh.t[:4].T, faces, mesh.nvertices)
     except MassSpringError as error:

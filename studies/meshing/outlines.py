@@ -1,4 +1,5 @@
-"""Sides that leave the outline of a held region, shaped for the displacement there, which goes as √r from it."""
+"""Shifts mid-side nodes next to the outline of a held region, where displacement varies as √r with the distance r from
+it."""
 
 import numpy as np
 from skfem import MeshTet2
@@ -6,10 +7,10 @@ from skfem import MeshTet2
 
 def drawn_middles(points: np.ndarray, mesh: MeshTet2, outlines: np.ndarray, share: float) -> np.ndarray:
     """Nodes at `points` (n, 3) [m] of a second-order mesh, with the middles of sides that have one end on `outlines`,
-    vertices (v,), at `share` of the side from that end. Sides keep their curves; all other nodes stay.
+    vertices (v,), at `share` of the side from that end. Sides keep their curves; all other nodes do not move.
 
-    ¼ would hold √r exactly (Barsoum, Int. J. Numer. Methods Eng. 10, 1976; for tetrahedra Nejati, Paluszny and
-    Zimmerman, Eng. Fract. Mech. 144, 2015), and folds elements with curved sides.
+    A share of ¼ would represent √r exactly (Barsoum, Int. J. Numer. Methods Eng. 10, 1976; for tetrahedra Nejati,
+    Paluszny and Zimmerman, Eng. Fract. Mech. 144, 2015), but it folds elements with curved sides.
     """
     on = np.zeros(mesh.nvertices, dtype=bool)
     on[outlines] = True

@@ -1,4 +1,4 @@
-"""Quadratic tetrahedra of a scene's organ, and how upright their elements are."""
+"""Quadratic tetrahedra of a scene's organ, and a measure of how far their elements are from folding."""
 
 from dataclasses import dataclass, field
 from typing import Any
@@ -15,13 +15,13 @@ TURNED = [0, 2, 1, 5, 4, 3]
 
 @dataclass(frozen=True, eq=False)
 class QuadraticMesh:
-    """A body of quadratic tetrahedra, curved where its true shape is known."""
+    """A mesh of quadratic tetrahedra, curved if the true shape is known."""
 
     name: str
     points: np.ndarray
     """Rest positions [m], (n, 3): nodes of the outer surface, then of the lumen, then inner ones."""
     cells: np.ndarray
-    """(k, 10) in VTK's order of a quadratic tetrahedron, upright."""
+    """Nodes of each element, (k, 10), in VTK's order of a quadratic tetrahedron; Jacobians are positive."""
     facets: np.ndarray
     """The whole boundary, outward from the tissue, (f, 6): corners, then the nodes between first and second, second and
     third, third and first."""
@@ -32,9 +32,9 @@ class QuadraticMesh:
     outer_count: int
     """Nodes of the outer surface."""
     patches: dict[str, np.ndarray]
-    """Of each held region all nodes of its facets."""
+    """All nodes of the facets of each held region."""
     recipe: dict[str, Any] = field(default_factory=dict)
-    """How to make the mesh again from which it comes, JSON-able."""
+    """The recipe of the mesh from which it was made, JSON-able."""
     cuts: dict[str, np.ndarray] = field(default_factory=dict)
     """Name -> corners of the faces inside the body along which a cut will open it, seen from in front of it, (f, 3)."""
 
@@ -60,8 +60,8 @@ def uprightness(points: np.ndarray, cells: np.ndarray, straight_volume: np.ndarr
     """How far each element (k, 10) is from folding, (k,): 1 when straight, at most 0 when it folds or a part does.
 
     The smaller of two ratios to straight_volume (k,) [m³]: of the least Bernstein coefficient of the Jacobian, over 6,
-    and of the least of the eight flat tetrahedra that stand for the element where it touches, times 8. Of the three
-    ways to cut its middle the best one counts.
+    and of the least volume of the eight flat tetrahedra that replace the element in contact, times 8, with the best of
+    the three ways to divide its middle.
     """
     bent = jacobian_coefficients(points, cells).min(axis=1) / 6.0
     corners = _volumes(points, cells[:, CORNER_PARTS]).min(axis=1)

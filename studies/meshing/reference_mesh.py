@@ -1,4 +1,4 @@
-"""The mesh of a reference: the mesher's, its sides curved onto the true surface and outlines."""
+"""The mesh of a reference: a mesh of the mesher with sides curved onto the true surface and outlines."""
 
 from dataclasses import replace
 
@@ -22,9 +22,9 @@ def reference_mesh(scene: Scene, level: float) -> tuple[MeshTet2, list[np.ndarra
     """The second-order mesh on one level of the scene's plan, the nodes of each of its held regions, and the middles of
     the corners of the lumen's facets [m], (f, 3).
 
-    A region is held at the nodes of its facets: a mid-side node outside them, across a dent, stays free. Whether an
-    element folds is judged where the reference integrates it, by reference_fem: the mesher's bound refuses more.
-    Raises StudyError for a mesh that cannot be made.
+    A region is held at the nodes of its facets: a mid-side node outside them, across a dent, stays free. reference_fem
+    checks folding at integration points; the bound of the mesher is stricter. Raises StudyError for a mesh that cannot
+    be made.
     """
     if scene.symmetric:
         return _curved_octant(scene, straight(_octant(scene, level))), [], np.empty((0, 3))
@@ -36,11 +36,11 @@ def reference_mesh(scene: Scene, level: float) -> tuple[MeshTet2, list[np.ndarra
 
 
 def on_true_sides(scene: Scene, organ_mesh: OrganMesh, coarse: HeldMesh, body: HeldMesh) -> MeshTet2:
-    """The second-order mesh of `body`, as curved as the coarse one that follows the true shape; straight where only a
+    """The second-order mesh of `body`, as curved as the coarse one, which follows the true shape; straight if only a
     mesh is known. Raises StudyError.
 
-    A scan has margins and folds that no coarse element can follow, and so have a few organs of a population: where an
-    element would fold, its sides bend less.
+    Scans, and a few organs of a population, have margins and folds that no coarse element can follow: where an element
+    would fold, its sides are curved less.
     """
     shape, mesh = true_shape(scene.organ), MeshTet2.from_mesh(body.mesh)
     if shape is None:
@@ -55,7 +55,7 @@ def on_true_sides(scene: Scene, organ_mesh: OrganMesh, coarse: HeldMesh, body: H
 
 
 def _folds(mesh: MeshTet2) -> bool:
-    """Whether reference_fem refuses an element of it."""
+    """Whether reference_fem rejects an element of the mesh."""
     try:
         check_neighbours(mesh)
     except SolveError:
@@ -69,7 +69,8 @@ def _octant(scene: Scene, level: float) -> OrganMesh:
 
 
 def _curved_octant(scene: Scene, plain: MeshTet) -> MeshTet2:
-    """Moved along the radius: a node of a symmetry plane stays in it to the last bit, or it would not be held there."""
+    """The octant with nodes moved along the radius, so that nodes of a symmetry plane stay in it to the last bit;
+    otherwise they would not be held."""
     radius = float(scene.organ.parameters["radius"])
     on_sphere = lambda x: np.linalg.norm(x, axis=0) > radius * (1 - 1e-6)  # noqa: E731
     return curve(plain, lambda x: project_ball(x.T, radius).T, on_sphere)

@@ -1,4 +1,4 @@
-"""The surface of a body at rest, with sides as curved as its facets, and the nearest points on it."""
+"""The surface of a body at rest, with flat or curved facets, and the nearest points on it."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -17,25 +17,25 @@ from studies.geometry.surface.distance import distance_to_surface
 from studies.geometry.surface.sides import along_facets, lattice, shape_functions
 
 DIVISIONS = 6
-"""Parts of a facet's side where it is sampled: 28 points and 36 triangles a facet."""
+"""Divisions of the sides of a facet for sampling: 28 points and 36 triangles per facet."""
 CANDIDATES = 12
-"""Triangles tried first for a point, by their centroids."""
+"""Number of triangles, by distance of their centroids, that are tried first for a point."""
 BLOCK = 4_000
-"""Points that are looked for at once: what they need stays below 100 MB."""
+"""Points searched at once, so that the memory stays below 100 MB."""
 ROUNDING = 1e-9
-"""Of the surface's size: by so much two ways to compute a distance may differ."""
+"""Difference, over the size of the surface, allowed between two computations of a distance."""
 VOLUME_ORDER = 4
-"""x · (x_s × x_t) of a quadratic facet is a polynomial of this degree."""
+"""Degree of the polynomial x · (x_s × x_t) of a quadratic facet."""
 OUTER, LUMEN = "outer", "lumen"
 
 
 class Nearest(NamedTuple):
-    """The points of a surface that are nearest to q others."""
+    """The points of a surface nearest to q given points."""
 
     distance: np.ndarray
-    """(q,) [m]."""
+    """Distances, (q,) [m]."""
     facet: np.ndarray
-    """(q,)."""
+    """Facets of the nearest points, (q,)."""
     local: np.ndarray
     """Barycentric coordinates in the facet, (q, 3)."""
 
@@ -61,13 +61,14 @@ class RestSurface:
 
     @property
     def areas(self) -> np.ndarray:
-        """What each node has of the area of the flat triangles between the nodes [m²], (n,)."""
+        """Share of each node in the area of the flat triangles between the nodes [m²], (n,)."""
         flat = self.facets[:, PARTS_OF_FACET].reshape(-1, 3) if self.curved else self.facets
         return np.bincount(flat.ravel(), np.repeat(triangle_areas(self.points, flat) / 3.0, 3), len(self.points))
 
     @cached_property
     def volume(self) -> float:
-        """Volume [m³] that it encloses: negative for a lumen, whose facets look into it. Exact for curved facets."""
+        """Volume [m³] that it encloses: negative for a lumen, whose facets are oriented into it. Exact for curved
+        facets."""
         local, weights = get_quadrature(RefTri, VOLUME_ORDER)
         centred = (self.points - self.points[self.facets].mean(axis=(0, 1)))[self.facets]
         barycentric = np.column_stack([1.0 - local.sum(axis=0), *local])
@@ -107,7 +108,7 @@ def rest_surfaces(points: np.ndarray, facets: np.ndarray) -> dict[str, RestSurfa
 
 
 def six_node_facets(triangles: np.ndarray) -> np.ndarray | None:
-    """The facets (f, 6) whose four flat parts a quadratic body has as its triangles (4 f, 3); None where they are not
+    """The facets (f, 6) whose four flat parts are the `triangles` (4 f, 3) of a quadratic body; None if they are not
     such parts."""
     if len(triangles) % 4:
         return None
@@ -131,8 +132,8 @@ def _slopes(local: np.ndarray, curved: bool) -> np.ndarray:
 def _nearest(
     queries: np.ndarray, corners: np.ndarray, tree: KDTree, distance: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Which of the triangles (t, 3, 3), with a tree of their centroids, is at the `distance` (q,) [m] from each
-    of `queries` (q, 3), and where in it (q, 3)."""
+    """For each of `queries` (q, 3) the triangle of `corners` (t, 3, 3) at the `distance` (q,) [m], and the barycentric
+    coordinates in it (q, 3); `tree`: of the centroids."""
     triangle, inside = np.empty(len(queries), np.int64), np.empty((len(queries), 3))
     pending, count = np.arange(len(queries)), min(CANDIDATES, len(corners))
     allowed = ROUNDING * float(np.ptp(corners[:, 0], axis=0).max())
@@ -150,7 +151,7 @@ def _nearest(
 
 def _feet(queries: np.ndarray, corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Squared distances (q, k) [m²] of points (q, 1, 3) to triangles (q, k, 3, 3), and the nearest points as
-    barycentric coordinates (q, k, 3): the foot in the plane where it is inside, else on the nearest side."""
+    barycentric coordinates (q, k, 3): the foot in the plane if it is inside, else that on the nearest side."""
     u, v = corners[:, :, 1] - corners[:, :, 0], corners[:, :, 2] - corners[:, :, 0]
     w = queries - corners[:, :, 0]
     uu, uv, vv, wu, wv = (np.einsum("qki,qki->qk", *pair) for pair in ((u, u), (u, v), (v, v), (w, u), (w, v)))

@@ -1,4 +1,4 @@
-"""Nodes moved as far as their elements allow."""
+"""Moves nodes as far as their elements allow."""
 
 from collections.abc import Callable
 
@@ -7,21 +7,21 @@ import numpy as np
 from studies.base.errors import StudyError
 
 FLOOR = 0.1
-"""Of what an upright element has: elements below it take nodes back. Flatter ones force a small time step."""
+"""Smallest allowed measure of an element, 1 for an ideal one. Flatter elements would require a small time step."""
 STEP = 0.1
-"""Of a move, that a node takes back at a time."""
+"""Share of its motion by which a node moves back at a time."""
 
 Measure = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]
-"""Points (n, 3), elements (k, m) of them and their numbers (k,) -> how upright they are, (k,): 1 for one that is as at
-rest, at most 0 for one inside out."""
+"""Points (n, 3), elements (k, m) of them and their numbers (k,) -> a measure of quality, (k,): 1 for an undeformed
+element, at most 0 for an inverted one."""
 
 
 def retreat(safe: np.ndarray, target: np.ndarray, cells: np.ndarray, measure: Measure, name: str) -> np.ndarray:
     """Share of the way from `safe` to `target` (n, 3) [m] that each node can go, (n,).
 
-    While an element of `cells` (k, m) is below FLOOR, or below what it is at `safe` if that is less, one of its nodes
-    takes a step back: the one that helps the elements around it most, or all where none helps. Raises StudyError for an
-    element that is not upright at `safe` already.
+    While the measure of an element of `cells` (k, m) is below FLOOR, or below its value at `safe` if that is less, one
+    of its nodes moves back by a step: the node that improves the elements around it most, or all nodes if none does.
+    Raises StudyError for an element that is inverted at `safe`.
     """
     every = np.arange(len(cells))
     at_rest = measure(safe, cells, every)
@@ -49,7 +49,7 @@ def retreat(safe: np.ndarray, target: np.ndarray, cells: np.ndarray, measure: Me
 
 
 def _gain(points: np.ndarray, node: int, place: np.ndarray, cells: np.ndarray, measure: Measure) -> float:
-    """How much the elements around a node are better for the node at `place` (3,) [m]."""
+    """Improvement of the elements around a node if the node is at `place` (3,) [m]."""
     around = np.flatnonzero((cells == node).any(axis=1))
     trial = points.copy()
     trial[node] = place

@@ -18,13 +18,13 @@ def mesh_for(
     on_shape: bool = False,
     even: bool = False,
 ) -> OrganMesh:
-    """The scene's organ with `nodes` surface nodes, the wall of a hollow one in `layers` (None: as many as make their
-    elements as high as long). Raises StudyError.
+    """The scene's organ with `nodes` surface nodes, the wall of a hollow one in `layers` (None: so many that elements
+    are as high as they are long). Raises StudyError.
 
-    A mesh file comes as it is, unless its parameters ask for a new surface: "remesh": true, or "smooth" or "wall" [m].
-    The flat sides of that enclose the volume of the file's surface, or its nodes are `on_shape`, for sides that will be
-    curved; nodes of all other organs always are. Nodes lie where the sides need them to follow the shape; those of
-    references are `even`, for these are halved until the shape is met.
+    A mesh file is used unchanged, unless its parameters ask for a new surface: "remesh": true, or "smooth" or "wall"
+    [m]. The flat sides of a new surface enclose the volume of the file's surface, or with `on_shape` its nodes are on
+    that surface, for sides that will be curved; nodes of all other organs always are on the surface. Nodes are denser
+    where the shape is more curved, or `even`ly spread for references, which are halved until they follow the shape.
     """
     if lookup(scene.organ.shape, [*SHAPES, "file"], "organ") != "file":
         sides = None if even else "curved" if on_shape else "straight"
@@ -40,7 +40,7 @@ def mesh_for(
 
 
 def patch_nodes(mesh: OrganMesh, name: str, region: object) -> np.ndarray:
-    """Surface nodes of a patch: as the mesher outlined it, or for a mesh from a file those inside the region."""
+    """Surface nodes of a patch: those of the patch of the mesher, or for a mesh from a file those inside the region."""
     if name in mesh.patches:
         return mesh.patches[name]
     return np.flatnonzero(region.level(mesh.points[: mesh.surface_count]) <= 0)  # pyright: ignore[reportAttributeAccessIssue]

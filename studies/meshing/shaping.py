@@ -1,4 +1,4 @@
-"""A held mesh laid onto the true shape of its organ, as linear or as quadratic tetrahedra."""
+"""Moves a HeldMesh onto the true shape of its organ, as linear or quadratic tetrahedra."""
 
 import warnings
 from dataclasses import replace
@@ -22,13 +22,13 @@ from studies.meshing.true_shape import as_curved, in_cut_planes, on_true_shape, 
 from studies.scene.scene import Scene
 
 OFF = 1e-3
-"""Of the body's size: nodes farther than this from where they belong cause a warning."""
+"""Distance of a node from its target, over the size of the body, beyond which there is a warning."""
 
 
 def linear_mesh(scene: Scene, organ_mesh: OrganMesh, coarse: HeldMesh, fine: HeldMesh) -> OrganMesh:
     """The finer mesh with its vertices on the true shape, those of rims on the true outline. Raises StudyError.
 
-    That of a file stays as it is: its flat sides enclose the volume of the file's surface already.
+    The mesh of a file is not changed: its flat sides already enclose the volume of the file's surface.
     """
     cells, shape = upright_cells(fine)[:, :4], None if scene.organ.shape == "file" else true_shape(scene.organ)
     points = nodes(fine.mesh)[: fine.mesh.nvertices]
@@ -54,8 +54,8 @@ def linear_mesh(scene: Scene, organ_mesh: OrganMesh, coarse: HeldMesh, fine: Hel
 def quadratic_mesh(
     scene: Scene, organ_mesh: OrganMesh, coarse: HeldMesh, fine: HeldMesh, share: float
 ) -> QuadraticMesh:
-    """The finer mesh with mid-side nodes, curved where the true shape is known: where not, a warning says so;
-    those of sides that leave an outline at `share` of them from it.
+    """The finer mesh with mid-side nodes, curved if the true shape is known, else with a warning. Mid-side nodes of
+    sides that start at an outline are placed at `share` of the side from it.
 
     Raises StudyError.
     """
@@ -87,8 +87,8 @@ def quadratic_mesh(
 
 
 def curved_points(scene: Scene, organ_mesh: OrganMesh, coarse: HeldMesh, fine: HeldMesh, shape: Shape) -> np.ndarray:
-    """Nodes of the finer second-order mesh [m], (n, 3), those of its boundary on the true shape as far as no element
-    folds; warns of nodes that stay off it. Raises StudyError."""
+    """Nodes of the finer second-order mesh [m], (n, 3), with boundary nodes on the true shape as far as no element
+    folds. Warns of nodes that remain off it. Raises StudyError."""
     points = laid_out(scene, organ_mesh, coarse, fine, shape)
     aim = aimed(scene, fine, shape, points)
     if fine is not coarse:
@@ -102,8 +102,8 @@ def curved_points(scene: Scene, organ_mesh: OrganMesh, coarse: HeldMesh, fine: H
 
 
 def drawn_points(points: np.ndarray, body: HeldMesh, share: float, name: str) -> np.ndarray:
-    """Nodes at `points` (n, 3) [m] with the middles of sides that leave an outline at `share` of them, as far as
-    no element folds."""
+    """Nodes at `points` (n, 3) [m], with mid-side nodes of sides that start at an outline shifted towards `share` of
+    the side, as far as no element folds."""
     held, mesh = all_facets(body)[:-2], MeshTet2.from_mesh(body.mesh)
     outlines = np.concatenate([*(rim_sides(facets)[:, :2].ravel() for facets in held), body.front])
     cells = upright_cells(body)
@@ -112,23 +112,23 @@ def drawn_points(points: np.ndarray, body: HeldMesh, share: float, name: str) ->
 
 
 def less_bent(points: np.ndarray, body: HeldMesh, name: str) -> np.ndarray:
-    """Nodes [m], (n, 3), whose sides bend as far towards `points` (n, 3) as keeps the flat parts of each element
-    upright: the parts of a curved one may not be. Raises StudyError."""
+    """Nodes [m], (n, 3), with sides curved towards `points` (n, 3) as far as the flat parts of each element remain
+    positive; those of a fully curved element may not be. Raises StudyError."""
     cells, count = upright_cells(body), body.mesh.nvertices
     vertices = moved_vertices(nodes(body.mesh)[:count], points[:count], cells[:, :4], name)
     plain = with_middles(vertices, body)
-    # A side keeps its bend where its ends are held back.
+    # A side keeps its curve if its ends do not reach their targets.
     bent = points + plain - with_middles(points[:count], body)
     return moved(plain, bent, cells, upright_against(plain, cells), name)
 
 
 def with_middles(vertices: np.ndarray, body: HeldMesh) -> np.ndarray:
-    """The vertices (v, 3) and the middles between them, in the order of `reference_fem.nodes`."""
+    """The vertices (v, 3) and the midpoints of the edges, in the order of `reference_fem.nodes`."""
     return np.concatenate([vertices, vertices[body.mesh.edges].mean(axis=0)])
 
 
 def moved_vertices(safe: np.ndarray, target: np.ndarray, cells: np.ndarray, name: str) -> np.ndarray:
-    """Vertices as far on the way from `safe` to `target` (v, 3) [m] as leaves no tetrahedron (k, 4) much flatter.
+    """Vertices moved from `safe` towards `target` (v, 3) [m] as far as no tetrahedron (k, 4) becomes much flatter.
 
     Raises StudyError."""
     before = tetrahedron_radius_ratio(safe, cells)
@@ -137,7 +137,7 @@ def moved_vertices(safe: np.ndarray, target: np.ndarray, cells: np.ndarray, name
 
 def laid_out(scene: Scene, organ_mesh: OrganMesh, coarse: HeldMesh, fine: HeldMesh, shape: Shape) -> np.ndarray:
     """Nodes of the finer mesh [m], (n, 3), as curved as the coarse one, whose sides follow the true shape as far as
-    that folds none of its elements. Raises StudyError."""
+    none of its elements folds. Raises StudyError."""
     plain = MeshTet2.from_mesh(coarse.mesh)
     bent = on_true_shape(curved(organ_mesh, may_fold=True, shape=shape), coarse, shape, scene.held, scene.cuts)
     cells, straight = upright_cells(coarse), nodes(plain)
@@ -146,20 +146,21 @@ def laid_out(scene: Scene, organ_mesh: OrganMesh, coarse: HeldMesh, fine: HeldMe
 
 
 def upright_against(points: np.ndarray, cells: np.ndarray) -> Measure:
-    """How upright the elements (k, 10) are, against the straight ones at `points` (n, 3) [m]."""
+    """A measure of `uprightness` for elements (k, 10), relative to the straight ones at `points` (n, 3) [m]."""
     volume = tetrahedron_volumes(points, cells[:, :4])
     return lambda x, some, which: uprightness(x, some, volume[which])
 
 
 def moved(safe: np.ndarray, target: np.ndarray, cells: np.ndarray, measure: Measure, name: str) -> np.ndarray:
-    """Points (n, 3) [m] as far on the way from `safe` to `target` as keeps the elements upright. Raises StudyError."""
+    """Points (n, 3) [m] moved from `safe` towards `target` as far as the elements allow (studies.meshing.retreat).
+    Raises StudyError."""
     share = retreat(safe, target, cells, measure, name)[:, None]
-    # Exact where nothing is held back: safe + (target - safe) would be rounded.
+    # Exact for nodes that reach their target: safe + (target - safe) would be rounded.
     return np.where(share == 1.0, target, safe + share * (target - safe))
 
 
 def tell(name: str, points: np.ndarray, aim: np.ndarray) -> None:
-    """Warns of nodes that are off the true shape: `points` (n, 3) belong at `aim` [m]."""
+    """Warns of nodes off the true shape: `points` (n, 3) have their targets at `aim` [m]."""
     off = np.linalg.norm(aim - points, axis=1)
     far = off > OFF * float(np.ptp(points, axis=0).max())
     if far.any():
@@ -171,8 +172,8 @@ def tell(name: str, points: np.ndarray, aim: np.ndarray) -> None:
 
 
 def aimed(scene: Scene, fine: HeldMesh, shape: Shape, points: np.ndarray) -> np.ndarray:
-    """Where the nodes at `points` (n, 3) [m] belong: boundary nodes on the true surface, those of rims and of the trace
-    of a cut on the true outline, the others where they are."""
+    """Target positions of the nodes at `points` (n, 3) [m]: boundary nodes on the true surface, those of rims and of
+    the trace of a cut on the true outline; others do not move."""
     *held, outer, lumen = all_facets(fine)
     points = points.copy()
     for facets, surface in ((outer, shape), (lumen, at_depth(shape, shape.wall or 0.0))):
@@ -208,7 +209,7 @@ def inverse(order: np.ndarray) -> np.ndarray:
 
 
 def named_patches(scene: Scene, name: str, held: list[np.ndarray], new: np.ndarray) -> dict[str, np.ndarray]:
-    """Of each held region the nodes of its facets, in their new numbers. Raises StudyError for a region without."""
+    """Nodes of the facets of each held region, by new numbers. Raises StudyError for a region without facets."""
     patches = {}
     for region, facets in zip(scene.held, held, strict=True):
         if not len(facets):

@@ -19,9 +19,9 @@ from studies.scene.scene import Held, Organ
 
 
 def true_shape(organ: Organ) -> Shape | None:
-    """The organ as a level function, the same for all its meshes; None for a mesh file that comes as it is.
+    """The organ as a level function, the same for all its meshes; None for a mesh file that is used unchanged.
 
-    Raises StudyError for an organ that there is not, or a file that cannot be read.
+    Raises StudyError for an unknown organ, or a file that cannot be read.
     """
     if organ.shape != "file":
         return lookup(organ.shape, SHAPES, "organ")(**organ.parameters)
@@ -38,7 +38,8 @@ def on_true_shape(
     true ones.
 
     smooth: `studies.geometry.curved` of the same vertices and tetrahedra.
-    A polygon instead would hold the body h²/8r too little or too much, of first order in the force.
+    With a polygon as outline the body would be held over a region that is off by h²/8r, a first-order error of the
+    force.
     """
     mesh = MeshTet2.from_mesh(body.mesh)
     points = nodes(mesh).copy()
@@ -54,8 +55,8 @@ def on_true_shape(
 
 def in_cut_planes(points: np.ndarray, body: HeldMesh, shape: Shape, cuts: tuple[Cut, ...]) -> np.ndarray:
     """P2 nodes at `points` (n, 3) [m] with those of the faces of each cut in its plane, those of its traces also on the
-    true surface, outer or of the lumen: a side that follows the surface alone leaves the plane, and so do those that
-    smoothing bends."""
+    true surface, outer or of the lumen: sides that only follow the surface, or are bent by smoothing, would leave the
+    plane."""
     if not cuts:
         return points
     mesh, points = MeshTet2.from_mesh(body.mesh), points.copy()
@@ -77,8 +78,8 @@ def in_cut_planes(points: np.ndarray, body: HeldMesh, shape: Shape, cuts: tuple[
 def as_curved(body: HeldMesh, coarse: HeldMesh, curved_coarse: MeshTet2) -> MeshTet2:
     """The finer mesh with sides as curved as those of the coarse one that lie on the true shape.
 
-    The quadratic map of a coarse element takes its parts with it exactly, so they stay upright however small they are;
-    moving each new vertex onto the surface by itself folds small elements beside large ones.
+    The quadratic map of a coarse element takes its parts with it exactly, so parts of any size remain positive. Moving
+    each new vertex separately onto the surface would fold small elements next to large ones.
     """
     if body is coarse:
         return curved_coarse

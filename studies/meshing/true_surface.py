@@ -1,4 +1,4 @@
-"""The true surface of an organ, sampled once per process, and how near a body at rest is to it."""
+"""The true surface of an organ, sampled once per process, and the deviation of a body at rest from it."""
 
 import hashlib
 import json
@@ -22,7 +22,7 @@ from studies.scene.organ_file import scanned
 from studies.scene.scene import Organ
 
 ORGANS = 128
-"""Organs whose surfaces are kept: about 2 MB each."""
+"""Most organs whose surfaces are cached, about 2 MB each."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +32,7 @@ class TrueSurface:
     sides: Mapping[str, tuple[np.ndarray, np.ndarray]]
     """OUTER and LUMEN -> points (n, 3) [m] on the surface and triangles (t, 3) between them, finer than a body's."""
     volumes: Mapping[str, float]
-    """What each encloses [m³], of a lumen negative: their sum is the tissue."""
+    """Volume inside each side [m³], negative for a lumen, so that the sum is the volume of the tissue."""
 
     @property
     def size(self) -> float:
@@ -41,7 +41,7 @@ class TrueSurface:
 
 
 class ShapeErrors(NamedTuple):
-    """How far a body at rest is from the true shape of its organ; NaN where that is not known."""
+    """Deviation of a body at rest from the true shape of its organ; NaN if that is unknown."""
 
     distance: float
     """Largest distance between both surfaces, seen from either, over the organ's size [1]."""
@@ -53,20 +53,20 @@ class ShapeErrors(NamedTuple):
 
     @property
     def worst(self) -> float:
-        """The larger one over its bound; above 1 the body does not keep the shape."""
+        """The larger ratio of an error to its bound; above 1 the body misses the shape."""
         return 100.0 * max(self.distance / SHAPE, abs(self.volume) / SHAPE_VOLUME)
 
 
 UNKNOWN = ShapeErrors(float("nan"), float("nan"))
 _MEASURED: dict[tuple[str, bytes], ShapeErrors] = {}
-"""By organ and body: cases that differ by method or step have the same body."""
+"""Cache by organ and body: cases that differ only by method or step have the same body."""
 
 
 def shape_errors(organ: Organ, sides: Mapping[str, RestSurface], filled: bool) -> ShapeErrors:
-    """Of the surfaces of a body at rest, as `rest_surfaces` gives them, against those of its organ.
+    """Errors of the surfaces of a body at rest, from `rest_surfaces`, relative to those of its organ.
 
-    filled: whether the body has the tissue alone inside, so that a hollow organ's lumen counts; the outer surface alone
-    otherwise. Unknown where the organ's surface is, or where the body has other sides than the organ.
+    filled: whether the body is the tissue, so that the lumen of a hollow organ counts; otherwise only the outer surface
+    does. NaN if the surface of the organ is unknown, or if the body has other sides than the organ.
     """
     digest = hashlib.sha256(f"{filled}".encode())
     for surface in sides.values():
@@ -86,8 +86,8 @@ def _measured(truth: TrueSurface | None, sides: Mapping[str, RestSurface], fille
 
 
 def true_surface(organ: Organ) -> TrueSurface | None:
-    """The surface of an organ's level function; of a mesh file that comes as it is, the file's own. None, with a
-    warning, where it cannot be had: a file that is gone or holds something else."""
+    """The surface of an organ's level function; for a mesh file that is used unchanged, that of the file. None, with a
+    warning, if the file is missing or has changed."""
     return _sampled(_text(organ))
 
 
@@ -100,7 +100,7 @@ def _sampled(text: str) -> TrueSurface | None:
     organ = Organ(*json.loads(text))
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", UserWarning)  # the mesher has told what it mended in a file
+            warnings.simplefilter("ignore", UserWarning)  # the mesher has already warned of its repairs to a file
             shape = true_shape(organ)
             return _of_file(organ) if shape is None else _of_shape(shape, organ.shape == "file")
     except StudyError as error:
@@ -130,7 +130,7 @@ def _of_shape(shape: Shape, scan: bool) -> TrueSurface:
 def _fine(shape: Shape, scan: bool) -> tuple[tuple[np.ndarray, np.ndarray], float]:
     """Points and triangles on f = 0, and the volume [m³] inside, to about 1e-5: its error falls with the squared edge,
     which the finer of two triangulations halves."""
-    # Loaded where they are used: scikit-image takes half a second.
+    # Imported here because scikit-image takes half a second.
     from studies.geometry.scanned.scan_shape import scan_surface
     from studies.geometry.surface.family import quartered
     from studies.geometry.surface.first_surface import first_surface

@@ -1,4 +1,4 @@
-"""The mesh of an organ cut by virtual nodes: copies of cells that move, and the tissue in them that is shown."""
+"""The mesh of an organ cut by virtual nodes: copies of cells, which move, and the tissue in them, which is recorded."""
 
 from dataclasses import dataclass, replace
 
@@ -15,31 +15,33 @@ from studies.geometry.mesh.organ_mesh import surface_first, unique_edges
 from studies.scene.cut import Cut
 
 NEAR = 1e-4
-"""Of the mean edge: the sheet of a cut keeps this distance from every node, and bends a little where one is nearer."""
+"""Distance of the sheet of a cut from every node, over the mean edge; the sheet bends slightly where a node is
+nearer."""
 
 
 @dataclass(frozen=True, eq=False)
 class Tissue:
-    """What there is of the copies: the cells divided at the sheet, with places between the nodes of a body."""
+    """The tissue in the copies: the cells divided at the sheet, with points interpolated between the nodes of a
+    body."""
 
     mesh: OrganMesh
-    """At rest; nodes on the two faces of the cut lie on each other."""
+    """Mesh of the tissue at rest; nodes on the two faces of the cut coincide."""
     between: csr_array
-    """Shares of the nodes of the body in each place, (p, n')."""
+    """Weights of the nodes of the body in each point, (p, n')."""
     pairs: np.ndarray
-    """Places behind the cut and in front of it, (q, 2)."""
+    """Points behind the cut and in front of it, (q, 2)."""
 
     def places(self, x: np.ndarray) -> np.ndarray:
-        """Where its nodes are with the body at `x` (…, n', 3) [m], (…, p, 3)."""
+        """Positions of its points for a body with nodes at `x` (…, n', 3) [m], (…, p, 3)."""
         return np.array([self.between @ one for one in x]) if x.ndim == 3 else self.between @ x
 
 
 @dataclass(frozen=True, eq=False)
 class VirtualMesh:
-    """A mesh that was cut along a sheet that no face of it follows."""
+    """A mesh that is cut along a sheet that its faces do not follow."""
 
     mesh: OrganMesh
-    """The copies as cells; triangles and patches are those before the cut, on the nodes that were there."""
+    """The copies as cells; triangles and patches are those before the cut, with the same node numbers."""
     share: np.ndarray
     """Part of each cell that is tissue, (k,)."""
     parent: np.ndarray
@@ -48,12 +50,13 @@ class VirtualMesh:
 
     @property
     def pairs(self) -> np.ndarray:
-        """Places of the tissue behind the cut and in front of it, (q, 2): no node of the body lies there."""
+        """Points of the tissue behind the cut and in front of it, (q, 2); they are not nodes of the body."""
         return self.tissue.pairs
 
 
 def virtual_mesh(mesh: OrganMesh, cut: Cut) -> VirtualMesh:
-    """A solid organ's mesh, which need not know the cut, cut with virtual nodes. Raises StudyError where it cannot."""
+    """The mesh of a solid organ, made without regard to the cut, cut with virtual nodes. Raises StudyError if that is
+    not possible."""
     cells, points = mesh.tetrahedra.astype(np.int64), mesh.points
     level, normal = cut.plane.level(points), np.asarray(cut.plane.normal, float) / np.linalg.norm(cut.plane.normal)
     edges = unique_edges(mesh.triangles)
@@ -73,8 +76,8 @@ def virtual_mesh(mesh: OrganMesh, cut: Cut) -> VirtualMesh:
 
 
 def _tissue(mesh: OrganMesh, level: np.ndarray, copies: VirtualNodes) -> Tissue:
-    """The cells of `mesh` divided at the sheet, where `level` (n,) is 0: on each side the places on crossing edges
-    move with the copies on that side."""
+    """The cells of `mesh` divided at the sheet, where `level` (n,) is 0: points on crossing edges move with the copies
+    on their side."""
     cells, points, n = mesh.tetrahedra.astype(np.int64), mesh.points, len(mesh.points)
     edges = crossing_edges(cells, level)
     along, at = crossings(points, level, edges)
@@ -116,8 +119,8 @@ def _order(before: np.ndarray, after: np.ndarray, n: int) -> np.ndarray:
 
 
 def _ends_on(side: int, cells: np.ndarray, level: np.ndarray, edges: np.ndarray, copies: VirtualNodes) -> np.ndarray:
-    """The nodes between which the place on each crossing edge moves on one side, (e, 2): the edge's own, or those of
-    the copies around it."""
+    """The nodes of the body between which the point on each crossing edge is interpolated on one side, (e, 2): those of
+    the edge, or of the copies around it."""
     ends, n = edges.copy(), len(level)
     own = copies.side == side
     before = cells[copies.cell[own]][:, EDGES_OF_TETRAHEDRON].reshape(-1, 2)

@@ -1,1 +1,1 @@
-"""Numbers read off a run."""
+"""Metrics: numbers computed from a run."""

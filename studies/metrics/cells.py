@@ -1,10 +1,10 @@
-"""Numbers as people read them: a value with the uncertainty of its reference."""
+"""Numbers as text: a value with the uncertainty of its reference."""
 
 import math
 
 MISSING = "–"
 UNRESOLVED_MARK = "†"
-"""Of an error that the reference knows less than ten times better than the model."""
+"""Mark of an error that is less than ten times the uncertainty of the reference."""
 UNRESOLVED_NOTE = f"{UNRESOLVED_MARK} unresolved: the uncertainty of the reference is more than a tenth of this error"
 MINUS = "−"
 

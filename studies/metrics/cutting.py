@@ -1,4 +1,5 @@
-"""Numbers of a run whose body is cut: its volumes, and what the cut did to energy, momentum, step and time."""
+"""Metrics of a run whose body is cut: volumes, and the effect of the cut on energy, momentum, stable step and computing
+time."""
 
 import numpy as np
 
@@ -6,7 +7,8 @@ from studies.metrics.metric import PERCENT
 from studies.metrics.run import Run
 
 THERE = 1e-12
-"""Relative distance of a volume's target from its end within which the clock of a cut has run out."""
+"""Relative difference of the target of a volume from its final value below which the return of volumes after a cut has
+ended."""
 
 
 def piece_worst(run: Run) -> float:

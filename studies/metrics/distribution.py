@@ -1,4 +1,4 @@
-"""A metric over the members of a population: median, range, worst member, and how sure of each one may be."""
+"""Distribution of a metric over the members of a population: median, range, worst member, and their confidence."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -14,25 +14,25 @@ BOUND = 0.95
 """Share of the members that a bound holds for."""
 RESAMPLES = 2000
 ENOUGH = 59
-"""Members of which the worst one is above the bound of 95 % of all organs with 95 % confidence: 1 - 0.95^59 = 0.951
-(Wilks, Annals of Mathematical Statistics 12 (1941) 91)."""
+"""Number of members with which the worst one exceeds, with 95 % confidence, the bound for 95 % of all organs: 1 -
+0.95^59 = 0.951 (Wilks, Annals of Mathematical Statistics 12 (1941) 91)."""
 
 
 @dataclass(frozen=True)
 class Distribution:
-    """Of one metric, in its unit, for one body on the members of a population."""
+    """The distribution of one metric, in its unit, for one body on the members of a population."""
 
     count: int
-    """Members that were judged."""
+    """Members with a value."""
     lost: int
-    """Members of which nothing is known: not meshed, failed, without a reference."""
+    """Members without a value: not meshed, failed, or without a reference."""
     median: float
     median_interval: tuple[float, float]
     """95 % confidence, from resampling."""
     middle: tuple[float, float]
-    """From the 2.5 to the 97.5 percentile of the members."""
+    """The 2.5th and 97.5th percentile of the members."""
     bound: float
-    """The 95th percentile of the absolute value: 95 of 100 members are at most that far off."""
+    """The 95th percentile of the absolute value: 95 of 100 members have an error of at most that."""
     bound_interval: tuple[float, float]
     """95 % confidence, from resampling; too narrow above with few members."""
     worst: float
@@ -41,19 +41,21 @@ class Distribution:
     floor: float
     """The largest uncertainty of a reference."""
     resolved: int
-    """Members whose reference is known to a third of the median absolute error, or better."""
+    """Members whose reference has an uncertainty of at most a third of the median absolute error."""
 
     @property
     def confidence(self) -> float:
-        """That of all organs at least 95 % are no farther off than the worst member: 1 - 0.95^n [1]."""
+        """Confidence that at least 95 % of all organs have an error of at most that of the worst member: 1 - 0.95^n
+        [1]."""
         return 1.0 - BOUND**self.count
 
 
 def distribution(values: Mapping[str, float], floors: Mapping[str, float], seed: int = 0) -> Distribution:
-    """Of the members by name; NaN counts as lost. floors: the uncertainty of the reference of each [same unit].
+    """The distribution of `values`, member -> value; NaN counts as lost. floors: the uncertainty of the reference of
+    each [same unit].
 
     Intervals are percentile intervals of RESAMPLES resamples (Efron and Tibshirani, An Introduction to the Bootstrap,
-    1993, chapter 13); a single member has none.
+    1993, chapter 13); they are NaN for a single member.
     """
     names = [name for name, value in values.items() if value == value]
     errors = np.array([values[name] for name in names])
@@ -84,7 +86,7 @@ def _bound(values: np.ndarray, axis: int = -1) -> np.ndarray:
 def _interval(values: np.ndarray, statistic: object, seed: int) -> tuple[float, float]:
     if len(values) < 2:
         return (np.nan, np.nan)
-    from scipy.stats import bootstrap  # which takes a quarter of a second to load
+    from scipy.stats import bootstrap  # the import takes a quarter of a second
 
     ends = bootstrap(
         (values,),
@@ -106,7 +108,7 @@ class Group:
     runs: tuple[Run, ...]
 
     def values(self, entry: Metric) -> tuple[dict[str, float], dict[str, float]]:
-        """Member -> value, and -> uncertainty of its reference; NaN for a run that ended badly."""
+        """Member -> value, and member -> uncertainty of its reference; NaN for a run that did not end well."""
         ok = {run.case.scene.name: run for run in self.runs if run.record.status == Status.OK}
         names = [run.case.scene.name for run in self.runs]
         nan = float("nan")

@@ -20,14 +20,14 @@ DISTANCE, VOLUME = metric("shape_error"), metric("shape_volume")
 
 
 class Measured(NamedTuple):
-    """A number and how well it is known, in one unit; NaN where it is not."""
+    """A number and its uncertainty in the same unit; NaN if unknown."""
 
     value: float
     uncertainty: float = NAN
 
     @property
     def known(self) -> bool:
-        """Whether there is a number."""
+        """Whether the number is not NaN."""
         return self.value == self.value
 
 
@@ -40,55 +40,55 @@ class Judged:
 
     case: Case
     force: Measured = UNKNOWN
-    """force_end [%], signed; unknown where the scene compares no force."""
+    """force_end [%], signed; unknown if the scene compares no force."""
     displacement: Measured = UNKNOWN
     """mean_error [%]."""
     cost: Measured = UNKNOWN
     """Computing time over simulated time [1], and half the range of the repeats of its median frame."""
     dt: float = NAN
-    """[s]."""
+    """Time step [s]."""
     timed_here: bool = False
-    """Whether the cost is of this machine."""
+    """Whether the cost was measured on this machine."""
     shape: Measured = UNKNOWN
     """shape_error [%]; unknown in tables of older code."""
     shape_volume: Measured = UNKNOWN
     """shape_volume [%], signed."""
     members: "tuple[Judged, ...]" = ()
-    """Of a recipe that ran on five neighbouring meshes: each of them; the errors are then the largest."""
+    """For a recipe that ran on five neighbouring meshes: the result on each; the errors above are then the largest."""
 
     @property
     def advisable(self) -> bool:
-        """Whether it may be advised: a body by implicit_volume. Other methods are there for comparison."""
+        """Whether it may be recommended: only bodies with implicit_volume. Other methods are for comparison."""
         return isinstance(self.case.method, ImplicitVolume)
 
     def median(self, name: str) -> float:
-        """Of an error by name over the meshes [%]: of the size of a signed one."""
+        """Median over the meshes of the absolute value of the error `name` [%]."""
         return float(np.median([abs(getattr(one, name).value) for one in self.members or (self,)]))
 
     @property
     def compared(self) -> bool:
-        """Whether anything is known of its errors."""
+        """Whether one of its errors is known."""
         return self.force.known or self.displacement.known
 
     @property
     def off_shape(self) -> dict[str, float]:
-        """The bounds of the shape that it misses -> measured over bound [1]."""
+        """Bounds of the shape that it exceeds -> measured value over bound [1]."""
         shares = _shares({"shape": (self.shape, SHAPE), "shape_volume": (self.shape_volume, SHAPE_VOLUME)})
         return {name: share for name, share in shares.items() if share > 1.0}
 
     def shares(self, wish: Wish) -> dict[str, float]:
-        """Every bound of a wish that can be judged here, and those of the shape that are missed -> measured over bound
-        [1]: 1 or less meets it."""
+        """Bounds of a wish whose quantity is known, and exceeded bounds of the shape -> measured value over bound [1]:
+        at most 1 meets the bound."""
         errors = {"force": (self.force, wish.force), "displacement": (self.displacement, wish.displacement)}
         return _shares({**errors, "budget": (self.cost, wish.budget)}) | self.off_shape
 
     def undecided(self, wish: Wish) -> bool:
-        """Whether an error is wished finer than the reference is known."""
+        """Whether the wish bounds an error more tightly than the uncertainty of the reference."""
         pairs = ((self.force, wish.force), (self.displacement, wish.displacement))
         return any(bound is not None and error.uncertainty > bound for error, bound in pairs)
 
     def worst(self, wish: Wish) -> float:
-        """The largest of its shares: 1 or less meets the wish; infinite where none of its errors is known."""
+        """The largest of `shares`: at most 1 meets the wish; infinite if none of its errors is known."""
         shares = self.shares(wish)
         return max(shares.values()) if {"force", "displacement"} & set(shares) else np.inf
 
@@ -98,7 +98,7 @@ def _shares(bounds: Mapping[str, tuple[Measured, float | None]]) -> dict[str, fl
 
 
 def judged(run: Run) -> Judged | None:
-    """What a run measured; None where it ended badly."""
+    """The results of a run; None if it did not end well."""
     if run.record.status != Status.OK:
         return None
     force, displacement = (Measured(entry(run), entry.uncertainty(run)) for entry in (FORCE, DISPLACEMENT))
@@ -108,10 +108,11 @@ def judged(run: Run) -> Judged | None:
 
 
 def over_meshes(rows: Iterable[Judged]) -> list[Judged]:
-    """Rows of one scene, those of neighbouring meshes as one, with the largest errors, at the place of the middle one.
+    """Results of one scene. Those of neighbouring meshes are combined into one with the largest errors, in the position
+    of the middle one.
 
-    Where any quadratic recipe ran on all five, one of implicit_volume that did not is left out: on one mesh it may be
-    right by luck, and of five where one ended badly it is not reliable."""
+    If any quadratic recipe ran on all five, recipes with implicit_volume that did not are left out: on a single mesh a
+    result may be right by chance, and if one of five did not end well, the recipe is not reliable."""
     by_setting = {(one.case.body, _setting(one)): one for one in rows}
     families = dict[tuple[BodyRecipe, str], Judged]()
     for (body, setting), one in by_setting.items():
@@ -125,7 +126,7 @@ def over_meshes(rows: Iterable[Judged]) -> list[Judged]:
 
 
 def _setting(one: Judged) -> str:
-    """What besides the body sets a case apart."""
+    """The settings of a case other than its body."""
     return replace(one.case, body=BodyRecipe(), recorded=(), timed=False).key
 
 
@@ -154,27 +155,27 @@ def cost_of_frames(frame_ns: np.ndarray, frame: float) -> Measured:
 
 
 def cheapest(rows: Iterable[Judged], wish: Wish) -> Judged | None:
-    """The advisable one of least cost that meets a wish and keeps the shape; those of unknown cost come last. None
-    where none does, or where the reference is less well known than is wished."""
+    """The recommendable result of least cost that meets a wish and the bounds of the shape; results of unknown cost
+    come last. None if there is none, or if the reference is less certain than the wish."""
     meeting = [one for one in rows if one.advisable and one.worst(wish) <= 1.0 and not one.undecided(wish)]
     return min(meeting, key=by_cost, default=None)
 
 
 def nearest(rows: Iterable[Judged], wish: Wish) -> Judged | None:
-    """The advisable one that misses a wish, or the shape, by the smallest factor; None of those whose errors are not
-    known."""
+    """The recommendable result that exceeds the wish or the bounds of the shape by the smallest factor; None if no
+    errors are known."""
     candidates = [one for one in rows if one.advisable and one.worst(wish) < np.inf]
     return min(candidates, key=lambda one: one.worst(wish), default=None)
 
 
 def by_cost(one: Judged) -> tuple[bool, float, float]:
-    """Orders by cost, where that is unknown by nodes over step."""
+    """Sort key: cost; if it is unknown, nodes over time step."""
     step = one.dt if one.dt == one.dt else one.case.dt_fraction
     return not one.cost.known, one.cost.value if one.cost.known else 0.0, one.case.body.nodes / step
 
 
 def front(points: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
-    """The (cost, error) that no other point beats in both, by ascending cost."""
+    """The Pareto front: points (cost, error) that no other point beats in both, by ascending cost."""
     best: list[tuple[float, float]] = []
     for cost, error in sorted(points):
         if not best or error < best[-1][1]:

@@ -1,4 +1,5 @@
-"""How a number that is read off a run is called, what it means, and what it may be compared with."""
+"""A metric: name, meaning and function of a number computed from a run, and the quantity of the reference with which it
+is compared."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -9,24 +10,25 @@ from studies.store.record import Status
 
 PERCENT = 100.0
 RESOLVED_SHARE = 0.1
-"""An error with more than this share of uncertainty in it is doubtful (docs/theory.md, the reference)."""
+"""An error is doubtful if the uncertainty of its reference is more than this share of it (docs/theory.md, the
+reference)."""
 COMPARABLE = (Status.OK, Status.INVERTED, Status.DRIFTED)
-"""A run that ended early has no last checkpoint."""
+"""Statuses of runs that reach the last checkpoint."""
 
 
 @dataclass(frozen=True)
 class Metric:
-    """How a number is called, what it means, and what it may be compared with."""
+    """Name, meaning and function of a number, and the quantity of the reference with which it is compared."""
 
     name: str
     unit: str
     better: str
-    """"lower", "higher", or "-" where the sign says which way it is off."""
+    """"lower", "higher", or "-" for a signed deviation."""
     of: Callable[[Run], float]
     quantity: str | None = None
-    """Of the reference: the name of its floor, and what the scene must allow to be compared."""
+    """Quantity of the reference: its uncertainty applies, and the scene must allow its comparison."""
     spread: Callable[[Run], float] | None = None
-    """Of a number that needs no reference: how well it is known, in its unit."""
+    """For a number that needs no reference: a function that returns its uncertainty, in its unit."""
 
     @property
     def description(self) -> str:
@@ -40,8 +42,8 @@ class Metric:
         return float(self.of(run))
 
     def uncertainty(self, run: Run) -> float:
-        """Uncertainty of the reference in the metric's unit, or the spread of the number; NaN without one or where
-        nothing may be compared."""
+        """Uncertainty of the reference in the metric's unit, or the spread of the number; NaN without one or if the
+        scene does not allow the comparison."""
         if self.spread is not None:
             return float(self.spread(run))
         if self.quantity is None or run.reference is None or not self._allowed(run):
@@ -49,14 +51,14 @@ class Metric:
         return PERCENT * run.reference.total_uncertainty[self.quantity]
 
     def unresolved(self, run: Run) -> bool:
-        """Whether the reference is not ten times better than what it judges here."""
+        """Whether the uncertainty of the reference is more than a tenth of the number."""
         uncertainty = self.uncertainty(run)
         return (
             uncertainty == uncertainty and self.quantity not in ALWAYS and uncertainty > RESOLVED_SHARE * abs(self(run))
         )
 
     def _allowed(self, run: Run) -> bool:
-        """Whether there is something to compare with, and the scene says that it may be."""
+        """Whether there is a reference, and the scene allows the comparison."""
         if self.quantity is None or self.quantity in ALWAYS:
             return True
         return run.reference is not None and allowed(run.case.scene, self.quantity)

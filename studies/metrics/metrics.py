@@ -1,4 +1,4 @@
-"""Numbers read off a run: functions Run -> float, each with its unit, direction and the floor of its reference."""
+"""Metrics of a run: functions Run -> float, each with its unit, direction and quantity of the reference."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -15,7 +15,7 @@ from studies.metrics.run import Run
 from studies.reference.ringing import ringing_frequency
 
 TOUCH = 1e-3
-"""Of the body's size: what is nearer to an obstacle touches it."""
+"""Distance to an obstacle, over the size of the body, below which a point touches it."""
 
 
 def volume_worst(run: Run) -> float:
@@ -49,7 +49,7 @@ def _relative(run: Run, weights: np.ndarray) -> float:
 def surface_error(run: Run) -> float:
     """Area-weighted relative L2 error of the displacement of the surface at the last checkpoint [%].
 
-    At the body's own points, as interior_error.
+    Evaluated at the nodes of the body, as interior_error.
     """
     return _relative(run, run.surface_weights)
 
@@ -57,7 +57,7 @@ def surface_error(run: Run) -> float:
 def interior_error(run: Run) -> float:
     """Volume-weighted relative L2 error of the displacement at the last checkpoint [%]; NaN without an interior.
 
-    At the body's own points: what the body lacks of the organ is not seen; shape_error sees it.
+    Evaluated at the nodes of the body, so it does not include parts of the organ that the body lacks; shape_error does.
     """
     if not len(run.fields.tetrahedra):
         return float("nan")
@@ -67,9 +67,9 @@ def interior_error(run: Run) -> float:
 def mean_error(run: Run) -> float:
     """Area-weighted mean error over the true surface, with what the body lacks, over the largest displacement [%].
 
-    Every boundary node of the reference is compared with the nearest point of the body at rest. A distance beyond 1 %
-    of the size is added to the error, so that no point is left out. The mean over a surface is the measure of Duan et
-    al. 2016.
+    Every boundary node of the reference is compared with the nearest point of the body at rest. If the distance exceeds
+    1 % of the size, it is added to the error, so that no point is left out. Duan et al. 2016 use the mean over a
+    surface.
     """
     mean, largest = run.true_surface_error
     return PERCENT * mean / largest
@@ -78,7 +78,8 @@ def mean_error(run: Run) -> float:
 def shape_error(run: Run) -> float:
     """Largest distance of the body at rest from the true surface and back, over the organ's size [%].
 
-    Curved facets count as curved; of a hollow organ with a wall the lumen too. NaN where the true shape is not known.
+    Curved facets are treated as curved; for a hollow organ with a wall the lumen is included. NaN if the true shape is
+    unknown.
     """
     return PERCENT * run.shape.distance
 
@@ -91,7 +92,7 @@ def shape_volume(run: Run) -> float:
 def silhouette_error(run: Run) -> float:
     """Hausdorff distance of the deformed surface to its deformation by the reference, over the body's size [%]."""
     triangles = run.fields.triangles
-    # The same polyhedron, moved by the reference: what the body lacks of the organ is judged by shape_error.
+    # The same polyhedron, moved by the reference: shape_error covers the difference of the body from the organ.
     truth = run.fields.rest.copy()
     truth[run.material_nodes] += run.displacement_error[0]
     return PERCENT * hausdorff(run.fields.snapshots[-1], triangles, truth, triangles) / run.size
@@ -129,7 +130,7 @@ def rest_distance(run: Run) -> float:
     mass = run.fields.mass / run.fields.mass.sum()
     before, after = rest - mass @ rest, last - mass @ last
     left, _, right = np.linalg.svd((mass[:, None] * before).T @ after)
-    # A turn, never a mirror image (Kabsch 1976).
+    # A rotation without reflection (Kabsch 1976).
     turn = left @ np.diag([1.0, 1.0, np.linalg.det(left @ right)]) @ right
     return PERCENT * float(np.sqrt(mass @ ((after - before @ turn) ** 2).sum(axis=1)) / run.size)
 
@@ -200,7 +201,7 @@ def sway(run: Run) -> float:
 def contact_facets(run: Run) -> float:
     """Outer facets with a point within 0.1 % of the size of the probed obstacle at the last checkpoint [1].
 
-    NaN where the force is not that of an obstacle, or the facets are not known."""
+    NaN if the force is not that of an obstacle, or the facets are unknown."""
     scene, sides = run.case.scene, run.sides
     if scene.probed.what != "obstacle" or sides is None or scene.probed.number >= len(scene.obstacles):
         return float("nan")
@@ -213,7 +214,8 @@ def contact_facets(run: Run) -> float:
 def contact_turn(run: Run) -> float:
     """Angle between the force of the probed obstacle and its push at the last checkpoint [deg].
 
-    Too few facets in a contact turn its force; the true one may have an angle of its own. NaN without an obstacle.
+    With too few facets in contact the force has a wrong direction; the true force may have an angle too. NaN without an
+    obstacle.
     """
     scene = run.case.scene
     forces = run.fields.contact_force
@@ -249,7 +251,7 @@ def real_time(run: Run) -> float:
 
 
 def _time_spread(metric: Callable[[Run], float]) -> Callable[[Run], float]:
-    """Half the range of a metric of frame times over the repeats, in its unit; NaN where the case was timed once."""
+    """Half the range of a metric of frame times over the repeats, in its unit; NaN if the case was timed only once."""
 
     def spread(run: Run) -> float:
         if run.timing is None or len(run.timing.frame_ns) < 2:

@@ -1,4 +1,4 @@
-"""A run with what it is judged by: the stored case, its reference, its frame times."""
+"""A run with the data that metrics need: the stored case, its reference, its frame times."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -23,27 +23,28 @@ from studies.store.record import Record, read_record
 from studies.store.schema import RunAttributes, RunFields
 
 SAME_PLACE = 1e-5
-"""Of the body's size: far above what a published reference rounds, far below an edge."""
+"""Distance over the size of the body below which two points coincide: far above the rounding of a published reference,
+far below an edge."""
 
 
 class BoundaryErrors(NamedTuple):
-    """At n boundary nodes of a reference."""
+    """Errors at n boundary nodes of a reference."""
 
     places: np.ndarray
-    """At rest, (n, 3) [m]."""
+    """Rest positions, (n, 3) [m]."""
     wrong: np.ndarray
     """Displacement of the body minus that of the reference, (n, 3) [m]."""
     distance: np.ndarray
-    """To the nearest point of the body at rest, (n,) [m]."""
+    """Distance to the nearest point of the body at rest, (n,) [m]."""
     areas: np.ndarray
-    """(n,) [m²]."""
+    """Areas of the nodes, (n,) [m²]."""
     truth: np.ndarray
     """Displacement of the reference, (n, 3) [m]."""
 
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """A measured case, with its reference and its frame times where there are any."""
+    """A measured case, with its reference and frame times if there are any."""
 
     case: Case
     record: Record
@@ -54,7 +55,8 @@ class Run:
     def load(path: Path | str) -> "Run":
         """The run that is stored in `path`, without reference and frame times (`load_runs` finds both).
 
-        Raises StudyError for a file that holds none, and for a method of a user's file that this process has not read.
+        Raises StudyError for a file without a run, and for a method from a user's file that this process has not
+        loaded.
         """
         record = read_record(Path(path))
         if record.kind != "run":
@@ -63,8 +65,8 @@ class Run:
 
     @cached_property
     def fields(self) -> RunFields:
-        """Stored arrays by name: `fields.t`; `RunFields.t` says unit and shape. None where one is optional and not
-        there; StudyError where nothing was computed."""
+        """Stored arrays by name: `fields.t`; `RunFields` documents units and shapes. None for an optional field that is
+        missing. Raises StudyError if nothing was computed."""
         return RunFields(self._words, {name: item.values for name, item in self.record.fields.items()})
 
     @cached_property
@@ -77,7 +79,7 @@ class Run:
         return f"the record of {self.record.name}, {self.record.status},"
 
     def field(self, name: str) -> np.ndarray:
-        """Stored values of a field that is there, by name."""
+        """Stored values of the existing field `name`."""
         return self.record.fields[name].values
 
     @cached_property
@@ -92,13 +94,13 @@ class Run:
 
     @cached_property
     def volume_ratio(self) -> np.ndarray:
-        """V/V0 of every frame [1], of the kept volume that is farthest off in it, (F,)."""
+        """V/V0 of every frame [1], for the kept volume with the largest error in that frame, (F,)."""
         ratio = self.fields.volume / self.fields.volume_target
         return ratio[np.arange(len(ratio)), np.argmax(np.abs(ratio - 1), axis=1)]
 
     @cached_property
     def lumen(self) -> int | None:
-        """Column of the lumen among the kept volumes; None where it is none of them."""
+        """Column of the lumen among the kept volumes; None if it is not kept."""
         column = int(self.record.attributes.get("lumen_column", -1))
         return column if column >= 0 else None
 
@@ -113,14 +115,15 @@ class Run:
     @cached_property
     def displacement_error(self) -> tuple[np.ndarray, np.ndarray]:
         """Displacements of the material nodes at the last checkpoint and their error [m], both (n, 3)."""
-        assert self.reference is not None  # _against checked it
+        assert self.reference is not None  # _against checked that
         rest = self.fields.rest[self.material_nodes]
         truth = self.reference.displacement(self.places[self.material_nodes])
         return truth, self.fields.snapshots[-1][self.material_nodes] - rest - truth
 
     @cached_property
     def places(self) -> np.ndarray:
-        """Where the reference is asked for each node [m], (n, 3): at rest, on a cut a little on the node's own side."""
+        """Points at which the reference is evaluated for each node [m], (n, 3): rest positions; for nodes on a cut
+        moved slightly to the side of the node."""
         rest, scene = self.fields.rest, self.case.scene
         if not scene.cuts:
             return rest
@@ -131,7 +134,7 @@ class Run:
 
     @cached_property
     def part_volumes(self) -> tuple[np.ndarray, np.ndarray]:
-        """Volumes of the pieces of a body that is cut, and what each should be [m³], both (F, r)."""
+        """Volumes of the pieces of a cut body, and their targets [m³], both (F, r)."""
         pieces = self.field("cut_parts")
         of = (pieces[:, None] == np.unique(pieces)).astype(float)
         return self.fields.volume @ of, self.fields.volume_target @ of
@@ -143,7 +146,7 @@ class Run:
 
     @cached_property
     def cut_of_pairs(self) -> np.ndarray:
-        """The number of the scene's cut that parted each pair, (p,)."""
+        """Number of the scene's cut that made each pair, (p,)."""
         return nearest_cut(self.case.scene.cuts, self.fields.rest[self.cut_pairs[:, 0]])
 
     @property
@@ -152,7 +155,7 @@ class Run:
         return np.array([cut.unit_normal for cut in self.case.scene.cuts])[self.cut_of_pairs]
 
     def gap(self, opening: np.ndarray) -> np.ndarray:
-        """The opening of each pair, as vectors (p, 3) [m], along the normal of its cut [m], (p,); below 0 where the
+        """The component of `opening` (p, 3) [m] along the normal of the cut of each pair [m], (p,); negative if the
         faces overlap."""
         return (opening * self._pair_normals).sum(axis=1)
 
@@ -164,7 +167,7 @@ class Run:
 
     @cached_property
     def cut_weights(self) -> np.ndarray:
-        """What each pair has of the area of the cut at rest [m²], (p,)."""
+        """Share of each pair in the area of the cut at rest [m²], (p,)."""
         faces = np.asarray(self.fields.cut_faces)
         area = triangle_areas(self.fields.rest, faces)
         share = np.bincount(faces.ravel(), weights=np.repeat(area / 3, 3), minlength=len(self.fields.rest))
@@ -172,9 +175,10 @@ class Run:
 
     @cached_property
     def boundary_errors(self) -> BoundaryErrors | None:
-        """Of each boundary node of the reference, on the sides that the body has, at the last checkpoint: the nearest
-        point of the body at rest is compared, with the displacement interpolated there. None where `sides` is None."""
-        assert self.reference is not None  # Metric checked it
+        """Errors at the last checkpoint for each boundary node of the reference, on the surfaces that the body has. The
+        node is compared with the nearest point of the body at rest, where the displacement is interpolated. None if
+        `sides` is None."""
+        assert self.reference is not None  # Metric checked that
         truth, sides = self.reference.boundary, self.sides or {}
         moved = self.fields.snapshots[-1] - self.fields.rest
         facets = self._outside(truth.points, truth.facets)
@@ -191,12 +195,12 @@ class Run:
     @cached_property
     def true_surface_error(self) -> tuple[float, float]:
         """Mean error of the displacement over the true surface at the last checkpoint, weighted by area, and the
-        largest true displacement there [m]; NaN where `sides` is None. A distance beyond SHAPE of the size counts as an
+        largest true displacement there [m]; NaN if `sides` is None. A distance above SHAPE of the size is added to the
         error."""
         errors = self.boundary_errors
         if errors is None:
             return float("nan"), float("nan")
-        assert self.reference is not None  # boundary_errors checked it
+        assert self.reference is not None  # boundary_errors checked that
         far = SHAPE / 100.0 * float(np.linalg.norm(np.ptp(self.reference.boundary.points, axis=0)))
         lengths = np.linalg.norm(errors.wrong, axis=1) + np.maximum(0.0, errors.distance - far)
         mean = np.average(lengths, weights=errors.areas)
@@ -204,26 +208,26 @@ class Run:
 
     @cached_property
     def material_nodes(self) -> np.ndarray:
-        """Nodes that are points of the organ: virtual nodes on an axis are none."""
+        """Nodes that are material points of the organ; virtual nodes on an axis are not."""
         if len(self.fields.tetrahedra):
             return np.arange(len(self.fields.rest))
         return np.unique(self.fields.triangles)
 
     @property
     def sides(self) -> dict[str, RestSurface] | None:
-        """The surfaces of the body at rest, "outer" and of a hollow one "lumen", those of a quadratic body curved; None
-        where the record of one does not tell its facets."""
+        """The surfaces of the body at rest: "outer", and "lumen" for a hollow body; curved for a quadratic body. None
+        for a record of a quadratic body without facets."""
         triangles = self.fields.triangles
         facets = six_node_facets(triangles) if self.case.body.kind == "quadratic" else triangles
         return None if facets is None else rest_surfaces(self.fields.rest, self._outside(self.fields.rest, facets))
 
     def _outside(self, points: np.ndarray, facets: np.ndarray) -> np.ndarray:
-        """Those of the boundary's facets (f, 3 or 6) that are not faces of a cut, which lie on each other at rest."""
+        """The boundary `facets` (f, 3 or 6) without the faces of a cut, which coincide in pairs at rest."""
         return facets if not self.case.scene.cuts else facets[~doubled(points, facets, self.size)]
 
     def _on_own_side(self, points: np.ndarray, facets: np.ndarray) -> np.ndarray:
-        """Nodes at `points` (n, 3) [m] of boundary `facets` (f, 3 or 6), those at the mouth of a cut a little on the
-        side of their facets: the nearest place on a body is on both sides of its own mouth, which a cut parts."""
+        """Nodes at `points` (n, 3) [m] of boundary `facets` (f, 3 or 6). Nodes at the mouth of a cut are moved slightly
+        towards their facets, since otherwise the nearest point of the body could be on either side of the cut."""
         nodes, moved = facets.ravel(), points
         for cut in self.case.scene.cuts:
             sides = np.sign(cut.plane.level(points[facets[:, :3]].mean(axis=1)))
@@ -238,7 +242,7 @@ class Run:
 
     @cached_property
     def shape(self) -> ShapeErrors:
-        """How far the body at rest is from the true shape of its organ."""
+        """Deviation of the body at rest from the true shape of its organ."""
         sides = self.sides
         if sides is None:
             return UNKNOWN

@@ -1,4 +1,5 @@
-"""One row per case: what it was, how it ended, and the study's metrics with the uncertainty of their reference."""
+"""Tables with one row per case: its settings, its status, and the metrics of the study with the uncertainty of their
+reference."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -14,15 +15,15 @@ from studies.reference.uncertainty import QUANTITIES
 from studies.runs.recipe_text import recipe_text
 
 Row = dict[str, Any]
-"""Names of columns, with values."""
+"""Column name -> value."""
 UNRESOLVED = "doubtful"
-"""Column with the metrics of which the reference knows the truth less than ten times better than the model."""
+"""Column with the metrics whose value is less than ten times the uncertainty of the reference."""
 
 
 def metric(name: str | Metric) -> Metric:
-    """The metric called `name`, or the one of a user's own that is given.
+    """The metric called `name`, or `name` itself if it is a user's metric.
 
-    Raises StudyError with the nearest match; for one of a user's own whose name is taken, or whose quantity no
+    Raises StudyError with the nearest match; also for a user's metric whose name is taken, or whose quantity no
     reference has.
     """
     if isinstance(name, str):
@@ -35,27 +36,27 @@ def metric(name: str | Metric) -> Metric:
 
 
 def check_columns(names: Sequence[str | Metric]) -> None:
-    """Raises StudyError for what is no metric, before minutes are spent on a table without it."""
+    """Raises StudyError for a name that is no metric, before minutes are spent on a table without it."""
     for name in names:
         metric(name)
 
 
 def study_table(runs: Sequence[Run], columns: Sequence[str | Metric]) -> pd.DataFrame:
-    """Metrics `columns`, by name or as they are, of `runs`; a column "… floor" follows where the reference has an
-    uncertainty of its own."""
+    """A table of the metrics `columns`, names or metrics, for `runs`; a column "… floor" follows a metric with an
+    uncertainty."""
     metrics = [metric(name) for name in columns]
     return frame_of([row_of(run, metrics) for run in runs])
 
 
 def frame_of(rows: Sequence[Row]) -> pd.DataFrame:
-    """Rows as a table, without floors that none of them has."""
+    """Rows as a table, without empty "… floor" columns."""
     frame = pd.DataFrame(rows)
     unknown = [name for name in frame.columns if " floor [" in name and frame[name].isna().to_numpy().all()]
     return frame.drop(columns=unknown)
 
 
 def row_of(run: Run, metrics: Sequence[Metric]) -> Row:
-    """What a run was, how it ended, and its metrics with their uncertainties."""
+    """Settings, status and metrics of a run, with uncertainties."""
     case, attributes = run.case, run.record.attributes
     row: Row = {
         "scene": case.scene.name,

@@ -1,7 +1,7 @@
-"""Whether a body can be trusted in a scene without a reference: the same recipe on two meshes, compared.
+"""Checks whether a body can be trusted in a scene without a reference, by comparing the same recipe on two meshes.
 
-What both meshes share, a half step or other masses do not show; the error of a body is that of its mesh
-(docs/accuracy.md).
+The comparison shows only the error of the mesh, not errors common to both meshes. The mesh dominates the error of a
+body; a halved step or other masses hardly change it (docs/accuracy.md).
 """
 
 from collections.abc import Sequence
@@ -23,28 +23,29 @@ from studies.scene.scene import Scene
 from studies.store.record import Status
 
 ENOUGH = 1594
-"""Nodes with which adaptive bodies of 95 of 100 random organs are within the target. With fewer two meshes may agree
-and both be wrong: half of the livers and spleens beyond the target with 1,194 nodes differ by less than the target from
-994 (docs/population.md)."""
+"""Nodes with which adaptive bodies of 95 of 100 random organs meet the target. With fewer nodes two meshes may agree
+although both are wrong: half of the livers and spleens that miss the target with 1,194 nodes differ by less than the
+target from 994 nodes (docs/population.md)."""
 COARSER_SHARE = 0.8
-"""Of the finer one's nodes the coarser one has at most this share: 1,194 of 1,594 were measured, and two meshes that
-are nearly the same agree whatever both lack."""
+"""Largest ratio of the nodes of the coarser mesh to those of the finer. Measured were 1,194 and 1,594; two nearly equal
+meshes agree even if both are wrong."""
 SHARE, SHARE_OF_HANGING = 1.5, 0.5
-"""Of the wished error by which two meshes may differ, the finer with ENOUGH nodes. Most of the difference is the error
-of the coarser one; but both lack the same at the outline by which an organ hangs."""
+"""Allowed difference of two meshes over the target error, with ENOUGH nodes in the finer: SHARE, and SHARE_OF_HANGING
+for an organ that hangs. Most of the difference is the error of the coarser mesh, but at the outline by which an organ
+hangs both have the same error."""
 
 
 class Apart(NamedTuple):
-    """How far two bodies of one scene are apart at its last checkpoint; NaN where the scene compares none."""
+    """Difference of two bodies in one scene at its last checkpoint; NaN if the scene does not allow the comparison."""
 
     force: float
-    """Of the probed force, over that of the finer [%]."""
+    """Difference of the probed force, over that of the finer body [%]."""
     displacement: float
-    """Mean over the surface of the finer body, over its largest displacement [%]."""
+    """Mean difference of displacement over the surface of the finer body, over its largest displacement [%]."""
 
 
 class Verdict(NamedTuple):
-    """Of the finest of two bodies or more in a scene."""
+    """Whether the finest of two or more bodies in a scene is trusted, and why."""
 
     scene: str
     trusted: bool
@@ -53,7 +54,7 @@ class Verdict(NamedTuple):
 
 
 def apart(coarse: Run, fine: Run) -> Apart:
-    """How far the coarse body is from the fine one."""
+    """The difference of the coarse body from the fine one."""
     scene = fine.case.scene
     force = displacement = float("nan")
     if allowed(scene, "force_end"):
@@ -74,30 +75,30 @@ def apart(coarse: Run, fine: Run) -> Apart:
 
 
 def verdicts(runs: Sequence[Run]) -> list[Verdict]:
-    """Of each scene without a reference in which a graded quadratic recipe ran on two meshes or more: of the two
-    finest."""
+    """Verdicts from the two finest meshes of each scene without a reference in which a graded quadratic recipe ran on
+    two or more meshes."""
     pairs = _pairs([run for run in runs if run.reference is None])
     finest = {(coarse.case.scene.name, _without_nodes(coarse.case.body)): (coarse, fine) for coarse, fine in pairs}
     return [_verdict(scene, *pair) for (scene, _), pair in finest.items()]
 
 
 class Judgement(NamedTuple):
-    """What the comparison of two meshes said of a scene, and what its reference says."""
+    """Result of the comparison of two meshes in a scene, and of that with its reference."""
 
     scene: str
     nodes: int
-    """Of the finer body."""
+    """Nodes of the finer body."""
     apart: Apart
     alike: bool
-    """Whether the two differ by no more than the wished errors."""
+    """Whether the difference of the two is within the target errors."""
     trusted: bool
     within: bool
-    """Whether the errors of the finer body are within the wish."""
+    """Whether the errors of the finer body are within the target."""
 
 
 def judgements(runs: Sequence[Run]) -> list[Judgement]:
-    """Of each scene with a reference and of each two neighbouring sizes of a graded quadratic recipe; only a finer one
-    with ENOUGH nodes may be trusted."""
+    """Judgements of each scene with a reference, for neighbouring sizes of each graded quadratic recipe. Only a finer
+    body with ENOUGH nodes may be trusted."""
     judged = []
     for coarse, fine in _pairs([run for run in runs if run.reference is not None]):
         scene, between = fine.case.scene, apart(coarse, fine)
@@ -105,7 +106,7 @@ def judgements(runs: Sequence[Run]) -> list[Judgement]:
         errors = ((FORCE, wish.force), (DISPLACEMENT, wish.displacement))
         values = [(abs(entry(fine)), bound) for entry, bound in errors if bound is not None]
         right = [value <= bound for value, bound in values if value == value]
-        if not right:  # nothing says whether it is right
+        if not right:  # no error is known
             continue
         trusted = not doubt(coarse.case, fine.case) and within(between, wish, allowed_share(scene))
         alike = within(between, wish, 1.0)
@@ -114,10 +115,10 @@ def judgements(runs: Sequence[Run]) -> list[Judgement]:
 
 
 class Tally(NamedTuple):
-    """Of judgements."""
+    """Counts of judgements."""
 
     beyond: int
-    """Scenes whose error is beyond the wish."""
+    """Scenes whose error exceeds the target."""
     named: int
     """Of these those that are not trusted."""
     within: int
@@ -127,13 +128,14 @@ class Tally(NamedTuple):
 
 
 def tally(judged: Sequence[Judgement]) -> Tally:
-    """How many of the bad are named and how many of the good are doubted."""
+    """Counts how many bodies beyond the target are not trusted, and how many within it are not trusted."""
     bad, good = [one for one in judged if not one.within], [one for one in judged if one.within]
     return Tally(len(bad), sum(not one.trusted for one in bad), len(good), sum(not one.trusted for one in good))
 
 
 def _pairs(runs: Sequence[Run]) -> list[tuple[Run, Run]]:
-    """Runs of neighbouring sizes of a graded quadratic recipe in a scene that both ended well, coarse one first."""
+    """Pairs of runs that ended well, of neighbouring sizes of a graded quadratic recipe in a scene, the coarse one
+    first."""
     pairs = []
     for group in by_scene(runs).values():
         recipes: dict[BodyRecipe, list[Run]] = {}
@@ -168,8 +170,8 @@ def _verdict(scene: str, coarse: Run, fine: Run) -> Verdict:
 
 
 def doubt(coarse: Case, fine: Case) -> str:
-    """Why the finer of two bodies of a scene is not trusted, however near they are; empty for what was measured:
-    adaptive bodies with ENOUGH nodes, next to one with at most COARSER_SHARE of them, in scenes without cuts
+    """Why the finer of two bodies of a scene is not trusted even if they agree; empty for the kinds that were measured:
+    adaptive bodies with ENOUGH nodes, compared with one of at most COARSER_SHARE of them, in scenes without cuts
     (docs/population.md)."""
     if fine.body.nodes < ENOUGH:
         return f"meshes with fewer than {ENOUGH:,} nodes may agree and be wrong"
@@ -181,12 +183,13 @@ def doubt(coarse: Case, fine: Case) -> str:
 
 
 def allowed_share(scene: Scene) -> float:
-    """What of the target the two bodies may differ by."""
+    """Allowed difference of the two bodies over the target."""
     return SHARE_OF_HANGING if load_of(scene) == "sag" else SHARE
 
 
 def within(between: Apart, wish: Wish, share: float) -> bool:
-    """Whether two meshes agree to `share` of the wished errors: the error of the finer is likely within them."""
+    """Whether two meshes agree to `share` of the target errors; the error of the finer is then likely within the
+    target."""
     pairs = ((between.force, wish.force), (between.displacement, wish.displacement))
     compared = [(value, bound) for value, bound in pairs if value == value and bound is not None]
     return bool(compared) and all(value <= share * bound for value, bound in compared)

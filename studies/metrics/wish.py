@@ -6,22 +6,22 @@ from studies.scene.kind import has_wall
 from studies.scene.scene import Scene
 
 SOLID, HOLLOW = (3.0, 1.0), (6.0, 3.0)
-"""Errors of force and displacement that are enough [%]."""
+"""Default targets of the errors of force and displacement [%]."""
 
 
 @dataclass(frozen=True)
 class Wish:
-    """Upper bounds; None: of no interest."""
+    """Upper bounds on errors and cost; None: no bound."""
 
     force: float | None = None
-    """Of |force_end| [%]."""
+    """Bound of |force_end| [%]."""
     displacement: float | None = None
-    """Of mean_error [%], of the largest displacement."""
+    """Bound of mean_error [%]."""
     budget: float | None = None
-    """Of computing time over simulated time [1]."""
+    """Bound of computing time over simulated time [1]."""
 
     def or_usual(self, scene: Scene) -> "Wish":
-        """The same, with the errors that are usually enough where it names no error."""
+        """The same, with the default targets if it bounds no error."""
         if self.force is not None or self.displacement is not None:
             return self
         return Wish(*(HOLLOW if has_wall(scene) else SOLID), self.budget)

@@ -1,4 +1,4 @@
-"""How far each model is from the reference in four quantities, and how well the reference itself is known."""
+"""Errors of each model in four quantities, with the uncertainty of the reference."""
 
 from collections.abc import Sequence
 
@@ -96,8 +96,8 @@ def _draw_scene(
 def _draw_point(
     axes: Axes, x: float, error: float, uncertainty: float, run: Run, looks: dict[BodyRecipe, BodyLook]
 ) -> float:
-    """A filled marker where the reference is much better known than the error, else a hollow one; never below the
-    uncertainty of the reference. A run that did not end ok is struck out."""
+    """A filled marker if the uncertainty of the reference is much smaller than the error, else a hollow one; never
+    drawn below that uncertainty. A run that did not end ok is struck out."""
     height = max(error, uncertainty)
     colour = looks[run.case.body].colour(run.case.method.name)
     face = colour if uncertainty <= RESOLVED_SHARE * error else "white"

@@ -1,4 +1,4 @@
-"""How much longer a frame takes with the constraint than without, and whether the difference is resolvable."""
+"""Ratio of the frame times with and without the constraint, and whether the difference can be resolved."""
 
 from collections.abc import Sequence
 

@@ -89,8 +89,8 @@ def _draw_scene(axes: Axes, group: Sequence[Run], looks: dict[BodyRecipe, BodyLo
 
 
 def _way(run: Run, motion: Trajectory) -> str:
-    """How far the press goes in from its first touch: "20 mm "; empty where no reference tells where that is. The nodes
-    of a coarse body leave out the points that are touched first."""
+    """How far the press goes in from its first touch: "20 mm "; empty without a reference, which gives the first touch:
+    the first points of contact are not nodes of a coarse body."""
     way = float(np.linalg.norm(motion.displacements[-1]))
     if run.case.scene.probed.what == "obstacle":
         if run.reference is None:

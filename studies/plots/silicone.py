@@ -16,11 +16,11 @@ TITLE = "A silicone beam let go: E and damping fitted without a load, the rest p
 LOOKS = tuple(zip((BLUE, SKY, GREEN, ORANGE, PURPLE, GREY, BLACK, *MUTED[:3]), "os^vDsXP*<", strict=True))
 MEASURED = "measured"
 REACH = {"sag": 6.0, "frequency": 15.0}
-"""Of the axes, in their units: what is farther off is named in a note."""
+"""Range of the axes, in their units; values beyond are named in a note."""
 
 
 class Point(NamedTuple):
-    """One row of the table: who says what of a load."""
+    """One row of the table: the values of one source at one load."""
 
     who: str
     newton: float
@@ -34,7 +34,7 @@ class Point(NamedTuple):
 
 
 class Bar(NamedTuple):
-    """A measurement: its mean, and how far it may be off."""
+    """A measurement: its mean and its uncertainty."""
 
     newton: float
     value: float
@@ -43,8 +43,8 @@ class Bar(NamedTuple):
 
 @styled
 def figure(rows: Sequence[Point], bars: Mapping[str, Sequence[Bar]]) -> Figure:
-    """A panel for each quantity in `bars` ("sag" [mm], "frequency" [Hz], "damping" [1]): what was measured is 0, with
-    its uncertainty, and what was predicted is off by so much."""
+    """A panel for each quantity in `bars` ("sag" [mm], "frequency" [Hz], "damping" [1]): the measurement is at 0, with
+    its uncertainty, and predictions are shown as differences from it."""
     if not rows:
         return blank(TITLE, "nothing is predicted yet")
     sheet = page(11, 4.2)

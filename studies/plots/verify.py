@@ -1,4 +1,4 @@
-"""How fast the reference finds the truth: errors over mesh size, and what kappa/mu does to a result."""
+"""Convergence of the reference: errors over mesh size, and the effect of kappa/mu on results."""
 
 from collections.abc import Sequence
 from pathlib import Path

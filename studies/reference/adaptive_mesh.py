@@ -1,8 +1,8 @@
-"""The mesh of a body whose elements are small where its scene needs it: one solution of the coarse body by reference
-elements shows where.
+"""Adaptive meshes of bodies: one solution of the coarse body with reference elements shows where a scene needs small
+elements.
 
-Halvings set by hand leave the error to the luck of a mesh: few facets in a contact turn its force, and over the lever
-to where it is held that turns the whole organ (docs/accuracy.md).
+With halvings set by hand the error depends on chance: with few facets in contact the force has a wrong direction,
+which, by the lever to the held region, turns the whole organ (docs/accuracy.md).
 """
 
 import math
@@ -37,12 +37,12 @@ from studies.scene.scene import Scene
 SOLID, HOLLOW = 0.7, 0.8
 """Nodes of the coarse body over those of the adapted one (measured: docs/accuracy.md)."""
 MOST = 0.95
-"""The same at most, for a mesh that keeps the area of all held regions."""
+"""Largest such ratio, if a finer coarse mesh is needed to keep the area of all held regions."""
 LOOSE = NewtonSettings(force_tol=1e-4, penetration_tol=1e-3)
-"""Enough to rank elements."""
+"""Tolerances that are sufficient to rank elements."""
 STRAIN = 1.0
-"""Largest stretch less 1 that an element at an outline may expect. There it grows as 1/√h while elements shrink, until
-they turn inside out (measured: docs/accuracy.md)."""
+"""Largest predicted stretch minus 1 of an element at an outline. There it grows as 1/√h as elements shrink, until they
+are inverted (measured: docs/accuracy.md)."""
 STEP = 1.25
 """Factor by which the number of elements grows until there are enough surface nodes."""
 
@@ -51,7 +51,7 @@ def adaptive_mesh(scene: Scene, number: int) -> QuadraticMesh:
     """The scene's organ in quadratic tetrahedra with `number` nodes on its outer surface or a few more, mid-side nodes
     among them: of a mesh with a share of them, elements are halved, those with the largest error indicator first.
 
-    A mesh file that comes as it is has its own coarse mesh. The wall of a hollow organ has one layer.
+    A mesh file that is used unchanged is the coarse mesh itself. The wall of a hollow organ has one layer.
     Raises StudyError for a scene without a static load or without a held region, for a mesh that cannot be made, and
     where the coarse body has no equilibrium.
     """
@@ -79,8 +79,8 @@ def adaptive_mesh(scene: Scene, number: int) -> QuadraticMesh:
 
 
 def coarse_mesh(scene: Scene, number: int) -> tuple[OrganMesh, HeldMesh]:
-    """The organ's mesh with a share of `number` nodes on its outer surface, mid-side nodes among them, or a larger
-    share where that loses area of a held region; the best where all do."""
+    """The organ's mesh with a share of `number` nodes on its outer surface, mid-side nodes among them, or with a larger
+    share if that mesh loses area of a held region; the best one if all do."""
     share = HOLLOW if is_hollow(scene) else SOLID
     level = max(FEWEST, round((share * number + 6) / 4))
     if remeshed(scene.organ):
@@ -92,9 +92,9 @@ def coarse_mesh(scene: Scene, number: int) -> tuple[OrganMesh, HeldMesh]:
 
 def lost_area(scene: Scene, level: int) -> float:
     """The largest error of the area of a held region [%] of quadratic elements on the mesh with `level` vertices on
-    the outer surface that will be halved; 0 where the true area is not known."""
+    the outer surface that will be halved; 0 if the true area is unknown."""
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", UserWarning)  # of the mesh that is chosen they come later
+        warnings.simplefilter("ignore", UserWarning)  # warnings of the chosen mesh come later
         organ_mesh, coarse, _ = halved(scene, level, 0, 0)
         mesh = quadratic_mesh(scene, organ_mesh, coarse, coarse, middles(scene))
     errors = [abs(held_area_error(scene, mesh, held)) for held in scene.held]
@@ -102,23 +102,23 @@ def lost_area(scene: Scene, level: int) -> float:
 
 
 def why_not(scene: Scene) -> str | None:
-    """Why a scene has no adaptive bodies; None where it has."""
+    """Why a scene cannot have adaptive bodies; None if it can."""
     if not scene.held:
         return "nothing holds the organ, so the reference elements have no unique solution"
     return NOT_ADAPTIVE.get(load_of(scene))
 
 
 def indicators_of(scene: Scene, organ_mesh: OrganMesh, coarse: HeldMesh) -> tuple[np.ndarray, np.ndarray]:
-    """The error indicator of the elements of the coarse body, opened along the scene's cuts, at its last checkpoint,
-    over the largest, and the largest principal stretch between their corners, both (ne,).
+    """Error indicator over its largest value, and largest principal stretch of the corners, both (ne,), of the elements
+    of the coarse body at the last checkpoint; the body is opened along the scene's cuts.
 
-    Raises StudyError where no equilibrium is found."""
+    Raises StudyError if no equilibrium is found."""
     try:
         mesh = on_true_sides(scene, organ_mesh, coarse, coarse)
         *held, wall = coarse.facets(mesh)
         middle = nodes(mesh)[wall[:, :3]].mean(axis=1)
         patches = [np.unique(facets) for facets in held]
-        if scene.cuts:  # the front of a cut strains what is around it
+        if scene.cuts:  # strains are large around the front of a cut
             mesh, parent = opened_elements(mesh, coarse.cut_faces)
             patches = [np.flatnonzero(np.isin(parent, patch)) for patch in patches]
         problem = problem_on(scene, mesh, patches, middle if scene.filled_at(math.inf) else None)
@@ -153,7 +153,7 @@ def adapted(coarse: HeldMesh, indicator: np.ndarray, number: int, least: float =
         body = marked(coarse, indicator, many, least)[0]
         if body.mesh.nelements <= few:
             raise StudyError(f"no element is left to halve, and the mesh has fewer than {number} nodes; ask for fewer")
-    # The fewest elements that do, within one in a hundred.
+    # The smallest sufficient number of elements, to within 1 %.
     while few and many - few > max(1, many // 100):
         middle = (few + many) // 2
         tried = marked(coarse, indicator, middle, least)[0]

@@ -1,4 +1,4 @@
-"""What of an equilibrium path is stored."""
+"""The stored fields of an equilibrium path."""
 
 import numpy as np
 
@@ -13,7 +13,8 @@ from studies.store.schema import REFERENCE_FIELDS
 
 
 def fields_of(scene: Scene, solution: FamilySolution) -> dict[str, Field]:
-    """The equilibria at the checkpoints, one row each, NaN where the path did not get there; and the samples."""
+    """The equilibria at the checkpoints, one row each, NaN for checkpoints that the path did not reach; and the
+    samples."""
     problem, equilibria = solution.problem, solution.equilibria
     x, tetrahedra = nodes(problem.mesh), problem.mesh.t.T.astype(np.int64)
     lengths = {"K": len(scene.checkpoints), "o": len(scene.obstacles), "g": len(problem.held), "n": len(x)}

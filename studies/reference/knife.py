@@ -1,4 +1,4 @@
-"""A knife in the deformed body as a cut of the body at rest: pulled back once, so that every solver cuts the same."""
+"""Converts a knife in the deformed body to a cut of the body at rest, so that every solver makes the same cut."""
 
 from dataclasses import dataclass
 
@@ -15,17 +15,17 @@ SIDES = np.array([(0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3)])
 BAND = 0.1
 """Half the width of the strip along the front from which its direction is fitted, over the size of the body."""
 MOST = 0.01
-"""Of the size: the largest distance between the pulled-back knife and the plane that replaces it."""
+"""Largest distance, over the size of the body, between the pulled-back knife and the plane that replaces it."""
 FEWEST = 6
-"""Places on the knife, and on its front, below which nothing can be fitted."""
+"""Fewest points on the knife, and on its front, for a fit."""
 
 
 @dataclass(frozen=True)
 class PulledBack:
-    """The cut of a knife, and what making it plane has cost."""
+    """The cut of a knife, and its deviations from a plane with a straight front."""
 
     cut: Cut
-    """In the body at rest."""
+    """The cut in the body at rest."""
     plane_deviation: float
     """Largest distance of the pulled-back knife from the plane [m]."""
     front_deviation: float
@@ -42,14 +42,14 @@ def pulled_back(
 ) -> PulledBack:
     """The cut that a knife makes in the deformed body at a checkpoint of its reference, as a plane at rest.
 
-    `plane` is the knife and `within` its blade (level <= 0), both as they lie in the deformed body [m]. Places where
-    sides of elements cross the knife are known in both configurations; at rest a plane and a straight front are
-    fitted to them by least squares. The cut is made at the time of the checkpoint; `dataclasses.replace` gives it
+    `plane` is the knife and `within` its blade (level <= 0), both as they lie in the deformed body [m]. The points at
+    which sides of elements cross the knife are computed in both configurations; at rest a plane and a straight front
+    are fitted to them by least squares. The cut is made at the time of the checkpoint; `dataclasses.replace` gives it
     contact, an advance or a free piece.
 
-    Raises StudyError for a symmetric scene, of which an octant alone is solved, a checkpoint that it has not, a knife
-    or blade that misses the body, and a knife or front that is farther than `most` times the size of the body from the
-    plane or line that replaces it.
+    Raises StudyError for a symmetric scene, for which only an octant is solved, for an unknown checkpoint, for a knife
+    or blade that misses the body, and for a knife or front that is farther than `most` times the size of the body from
+    the plane or line that replaces it.
     """
     scene = solution.scene
     words = f"scene '{scene.name}': knife '{name}'"

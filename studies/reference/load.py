@@ -1,4 +1,4 @@
-"""The finite-element reference of a scene, read back: its finest solution and its error bar."""
+"""Loads the finite-element reference of a scene: its finest solution and its error bar."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -16,12 +16,11 @@ from studies.store.record import Status, read_record
 
 @dataclass(frozen=True, eq=False)
 class Reference(Solution):
-    """The solution on the finest mesh, with what the others say of it."""
+    """The solution on the finest mesh, with its uncertainty from the other meshes and settings."""
 
     @property
     def source(self) -> str:
-        """The published set and file that it is of, as "2027.1 0a1b2c3d"; "solved here" for one that nobody
-        published."""
+        """The published set and file, as "2027.1 0a1b2c3d"; "solved here" for a reference that is not published."""
         return str(self.record.attributes.get("set", "solved here"))
 
     @cached_property
@@ -30,22 +29,22 @@ class Reference(Solution):
 
     @property
     def at(self) -> SamplePoints:
-        """Where solutions are compared."""
+        """The points at which solutions are compared."""
         return self._samples[0]
 
     @property
     def meshes(self) -> list[Sample]:
-        """Of the family, fine to coarse."""
+        """Samples of the meshes of the family, fine to coarse."""
         return [one for one in self._samples[1] if not one.variant]
 
     @property
     def variants(self) -> dict[str, Sample]:
-        """The coarsest mesh with one setting made better each."""
+        """Samples of the coarsest mesh with one refined setting each."""
         return {one.variant: one for one in self._samples[1] if one.variant}
 
     @cached_property
     def uncertainty(self) -> dict[str, Uncertainty]:
-        """Of each quantity, share by share."""
+        """Uncertainty of each quantity by shares."""
         return uncertainties(self.scene, self.at, self.meshes, self.variants)
 
     @cached_property
@@ -68,7 +67,7 @@ def load_reference(root: Path, scene: Scene) -> Reference | None:
 
 
 def reference_for(root: Path, scene: Scene) -> Reference | None:
-    """What a scene is judged by: the published reference, else the one stored below `root`; None without a plan.
+    """The reference of a scene: the published one, else the one stored below `root`; None for a scene without a plan.
 
     Raises StudyError as load_reference.
     """

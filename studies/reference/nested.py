@@ -1,4 +1,5 @@
-"""A reference on nested meshes: each solution starts from that of the coarser mesh, and says where to refine next."""
+"""A reference on nested meshes: each solution starts from that of the coarser mesh, and its error indicator selects the
+elements to refine next."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -28,17 +29,19 @@ from studies.scene.quantities import allowed
 from studies.scene.scene import Scene
 
 GROWTH = 2.5
-"""Unknowns of a mesh over those of the one before, at most: more, and its indicator knows too little of the next."""
+"""Largest ratio of the unknowns of a mesh to those of the one before: for larger steps the indicator is too
+inaccurate."""
 LEAST_GROWTH = 1.5
-"""The same at least, also where the plan's `most` is smaller."""
+"""Smallest such ratio, even if the plan's `most` is exceeded."""
 LOOSE = NewtonSettings(force_tol=1e-4)
-"""On all meshes but the coarsest: a looser balance of forces than usual, the usual penetration."""
+"""Settings for all meshes but the coarsest: a larger force tolerance than usual, the usual penetration."""
 DISPLACEMENT = 2.5
-"""Bar of the mean displacement that weighs as much as one of the force: it falls faster, so less is allowed."""
+"""Weight of the error bar of the mean displacement relative to that of the force: it falls faster, so its bound is
+tighter."""
 
 
 Work = tuple[Problem, tuple[float, ...], NewtonSettings]
-"""A problem, the checkpoints at which it is solved [s], and how."""
+"""A problem, the checkpoints at which it is solved [s], and the solver settings."""
 
 
 class Part(NamedTuple):
@@ -53,16 +56,16 @@ class MeshSolution(NamedTuple):
 
     mesh: NestedMesh
     parts: Sequence[Part]
-    """As `problems_of` the mesh."""
+    """Solutions of the problems of `problems_of(mesh)`."""
 
     @property
     def system(self) -> System:
-        """Of the last checkpoint."""
+        """System of the last checkpoint."""
         return self.parts[-1].system
 
     @property
     def equilibria(self) -> list[Equilibrium]:
-        """At every checkpoint, by the nodes of the mesh that is solved last."""
+        """Equilibria at every checkpoint, at the nodes of the mesh that is solved last."""
         equilibria = list[Equilibrium]()
         for system, states in self.parts:
             here = [describe(system, state, state.iterations, 1) for state in states]
@@ -72,28 +75,28 @@ class MeshSolution(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class FamilySolution:
-    """What the solutions of a scene's meshes give, and how the finest was reached."""
+    """The solutions on the meshes of a scene."""
 
     problem: Problem
-    """Of the finest mesh that was solved."""
+    """Problem on the finest mesh that was solved."""
     equilibria: Sequence[Equilibrium]
-    """At the scene's checkpoints; fewer where the path broke off."""
+    """Equilibria at the scene's checkpoints; fewer if the path broke off."""
     at: SamplePoints
     samples: Sequence[Sample]
-    """Of the meshes, fine to coarse, then of the refined settings."""
+    """Samples of the meshes, fine to coarse, then of the refined settings."""
     off: int = 0
     """Boundary nodes of the finest mesh that are not on the true shape."""
     stopped: str = ""
-    """Why refinement ended before the plan's tolerance, "" where it did not."""
+    """Why refinement ended before the tolerance of the plan was met; "" if it was met."""
     failure: str = ""
-    """Why there is no reference, "" where there is one."""
+    """Why there is no reference; "" if there is one."""
 
 
 Varied = Callable[[Problem, tuple[float, ...], NewtonSettings], tuple[Problem, tuple[float, ...], NewtonSettings]]
 
 
 def solve_nested(scene: Scene, variants: Mapping[str, Varied]) -> FamilySolution:
-    """The scene on its nested meshes, the coarsest also with each of the settings made better that its plan names.
+    """The scene on its nested meshes, the coarsest also with each setting of its plan refined.
 
     Raises StudyError for a mesh that cannot be made.
     """
@@ -139,8 +142,8 @@ def path_of(
     on_checkpoint: Callable[[Checkpoint], None] | None = None,
     better: Varied | None = None,
 ) -> list[Equilibrium]:
-    """Equilibria of problems on one of the nested meshes, one after the other, by the nodes of the last; with a setting
-    made `better`. Raises SolveError with what was reached."""
+    """Equilibria of the problems on one of the nested meshes in order, at the nodes of the last problem; `better`
+    refines a setting. Raises SolveError, which holds the equilibria that were reached."""
     equilibria = list[Equilibrium]()
     for one in work:
         try:
@@ -153,15 +156,15 @@ def path_of(
 
 
 def problem_of(mesh: NestedMesh) -> Problem:
-    """The scene on one of its nested meshes, opened if it is cut. Raises StudyError where a cut comes last."""
+    """The scene on one of its nested meshes, opened if it is cut. Raises StudyError if no checkpoint follows a cut."""
     check_judged_after_cut(mesh.scene)
     return problem_on(mesh.scene, mesh.solved, mesh.patches, mesh.lumen_at(math.inf))
 
 
 def problems_of(mesh: NestedMesh) -> list[Work]:
-    """The scene on one of its nested meshes with its checkpoints, those between the same cuts together: on the body
-    opened along the cuts that are made by then. Each has a path from rest: the tissue has no memory. Raises StudyError.
-    """
+    """The problems of a scene on one of its nested meshes with their checkpoints, one for each state of the cuts: the
+    body is opened along the cuts made by then. Each problem has a load path from rest, since the tissue has no memory.
+    Raises StudyError."""
     scene, after = mesh.scene, problem_of(mesh)
     made = [sum(cut.at < t for cut in scene.cuts) for t in scene.checkpoints]
     work = list[Work]()
@@ -176,8 +179,8 @@ def problems_of(mesh: NestedMesh) -> list[Work]:
 
 
 def in_last_mesh(mesh: NestedMesh, problem: Problem, equilibria: Sequence[Equilibrium]) -> list[Equilibrium]:
-    """Equilibria of one of its problems by the nodes of the mesh that is solved last: copies of a node are together
-    until a cut parts them."""
+    """Equilibria of one of the problems at the nodes of the mesh that is solved last: copies of a node coincide until a
+    cut separates them."""
     if problem.mesh is mesh.solved:
         return list(equilibria)
     node = parents(element_nodes(problem.mesh), element_nodes(mesh.solved))
@@ -186,17 +189,17 @@ def in_last_mesh(mesh: NestedMesh, problem: Problem, equilibria: Sequence[Equili
 
 
 def targets(first: int, most: float) -> list[float]:
-    """Unknowns of the meshes after the first one, up to `most`, each in the same ratio to the one before; at least one
-    that is LEAST_GROWTH times as large, for without a second mesh there is no error bar."""
+    """Numbers of unknowns of the meshes after the first one, up to `most`, with a constant ratio. There is at least
+    one, LEAST_GROWTH times as large, since an error bar needs a second mesh."""
     most = max(most, LEAST_GROWTH * first)
     steps = max(1, math.ceil(math.log(most / first) / math.log(GROWTH) - 1e-9))
     return [first * (most / first) ** (k / steps) for k in range(1, steps + 1)]
 
 
 def refined(solved: MeshSolution, unknowns: float) -> MeshSolution:
-    """The solution on a mesh of about so many unknowns, refined where the last checkpoint needs it.
+    """The solution on a mesh of about `unknowns` unknowns, refined by the error indicator of the last checkpoint.
 
-    Where Newton finds no equilibrium from the carried states, a path from rest is tried. Raises SolveError where that
+    If Newton finds no equilibrium from the transferred states, a path from rest is tried. Raises SolveError if that
     breaks off.
     """
     mesh, last = solved.mesh, solved.parts[-1]
@@ -207,11 +210,11 @@ def refined(solved: MeshSolution, unknowns: float) -> MeshSolution:
 
 
 def on_finer(part: Part, work: Work, parents: np.ndarray) -> Part:
-    """What is solved on a mesh, on the finer one whose elements are parts of the elements `parents` (ne,) of it.
-    Raises SolveError."""
+    """Solves the problem of `part` on a finer mesh, whose elements are parts of the elements `parents` (ne,) of the
+    coarser one. Raises SolveError."""
     fine = System(work[0], LOOSE)
     part.system.solver.release()
-    if fine.sticks.any():  # what an obstacle without slip holds depends on its way
+    if fine.sticks.any():  # the points held by a no-slip obstacle depend on its path
         return Part(fine, from_rest(fine, work[1]))
     coarse, mesh = part.system.problem.mesh, work[0].mesh
     to = transfer(coarse, at_nodes(mesh, parents), nodes(mesh))
@@ -222,8 +225,8 @@ def on_finer(part: Part, work: Work, parents: np.ndarray) -> Part:
 
 
 def from_carried(system: System, starts: Sequence[State]) -> list[State]:
-    """The equilibria near carried states, the last first: each other one starts with what solving changed in the one
-    after it, in proportion to the unknowns. Raises StepFailed."""
+    """The equilibria near transferred states, the last first. The start of each other one is corrected by the change
+    that the solution made to the next one, in proportion to the unknowns. Raises StepFailed."""
     states = [continued(system, starts[-1])]
     for start, after in zip(starts[-2::-1], starts[:0:-1], strict=True):
         share = np.linalg.norm(start.x) / max(float(np.linalg.norm(after.x)), np.finfo(float).tiny)
@@ -234,7 +237,7 @@ def from_carried(system: System, starts: Sequence[State]) -> list[State]:
 
 
 def from_rest(system: System, times: Sequence[float]) -> list[State]:
-    """The states at the times [s] of a load path. Raises SolveError where it breaks off."""
+    """The states at the times [s] of a load path. Raises SolveError if it breaks off."""
     state, states = system.rest(), list[State]()
     if system.starts_loaded():
         state, *_ = advance(system, state, system.settings.start, 1.0, [])
@@ -245,7 +248,7 @@ def from_rest(system: System, times: Sequence[float]) -> list[State]:
 
 
 def fine_enough(scene: Scene, at: SamplePoints, samples: Sequence[Sample], tolerance: float) -> bool:
-    """Whether the error bars of the finest of the meshes, fine to coarse, are within the tolerance."""
+    """Whether the error bars of the finest mesh are within the tolerance; `samples`: fine to coarse."""
     bars: dict[str, MeshError] = {
         name: uncertainty_of_meshes(scene, at, samples, name)
         for name in ("force_end", "surface_mean")

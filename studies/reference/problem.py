@@ -20,11 +20,11 @@ from studies.meshing.reference_mesh import reference_mesh
 from studies.scene.scene import Scene
 
 SAME_POINT = 1e-9
-"""Two nodes closer than this fraction of the body are one: far above rounding, far below an edge."""
+"""Fraction of the size of the body below which two nodes coincide: far above round-off, far below an edge."""
 
 
 def reference_problem(scene: Scene, level: float) -> Problem:
-    """The scene on mesh `level` of its reference plan, curved second order where the true surface is known.
+    """The scene on mesh `level` of its reference plan, with curved second-order elements if the true surface is known.
 
     Raises StudyError for a mesh that cannot be made, SolveError for one that cannot be used.
     """
@@ -33,7 +33,7 @@ def reference_problem(scene: Scene, level: float) -> Problem:
 
 def problem_on(scene: Scene, mesh: MeshTet2, patches: list[np.ndarray], lumen: np.ndarray | None) -> Problem:
     """The scene on a second-order mesh, with the nodes of each held region and the middles of the corners of the
-    lumen's facets [m], (f, 3); None where nothing fills it, as after a cut that opened it. Raises StudyError."""
+    lumen's facets [m], (f, 3); None if it is not filled, as after a cut that opened it. Raises StudyError."""
     tissue = scene.tissue
     return Problem(
         mesh=mesh,
@@ -48,7 +48,8 @@ def problem_on(scene: Scene, mesh: MeshTet2, patches: list[np.ndarray], lumen: n
 
 
 def _cavity(scene: Scene, middles: np.ndarray) -> Cavity:
-    """The lumen, walled by the facets with these middles (f, 3) [m]; its volume follows the scene."""
+    """The lumen as a cavity whose wall consists of the facets with these middles (f, 3) [m]; its volume follows the
+    scene."""
     if not len(middles):
         raise StudyError(f"scene '{scene.name}' fills a lumen, but its {scene.organ.shape} has none; leave it out")
     assert scene.lumen is not None  # it is filled
@@ -62,7 +63,7 @@ def anchor(obstacle: Obstacle) -> np.ndarray:
 
 
 def kept_obstacles(scene: Scene) -> tuple[Obstacle, ...]:
-    """The obstacles the reference sees: of an octant only those on its side of the symmetry planes."""
+    """The obstacles of the reference: for an octant only those on its side of the symmetry planes."""
     if not scene.symmetric:
         return scene.obstacles
     return tuple(o for o in scene.obstacles if (anchor(o) >= 0).all())
@@ -71,7 +72,7 @@ def kept_obstacles(scene: Scene) -> tuple[Obstacle, ...]:
 def whole_forces(scene: Scene, forces: np.ndarray) -> np.ndarray:
     """Forces of all scene obstacles (K, o, 3) [N] from those of the kept ones (K, kept, 3).
 
-    An obstacle centred on an axis presses four octants; what they feel across the axis cancels.
+    An obstacle centred on an axis presses four octants; the force components across the axis cancel.
     """
     if not scene.symmetric:
         return forces
@@ -102,7 +103,7 @@ def _held(scene: Scene, mesh: MeshTet2, patches: list[np.ndarray]) -> tuple[Pres
 
 
 def rigid(obstacle: Obstacle) -> RigidPlane | RigidSphere | RigidCapsule:
-    """The obstacle as the reference knows it. Raises StudyError for one it does not."""
+    """The obstacle as one of reference_fem. Raises StudyError for a kind that it does not support."""
     if isinstance(obstacle, Probe):
         raise StudyError(
             f"the reference knows planes, spheres and capsules, not the thin probe at {obstacle.tip}; "

@@ -1,6 +1,6 @@
 """`python -m studies.reference.publish SET [SCENE ...]`: solves references of the catalogue for the published set.
 
-For a release: a new set changes results (CHANGELOG). Scenes that are not named keep the file that they have.
+For a release: a new set changes results (CHANGELOG). Scenes that are not named keep their present file.
 """
 
 import argparse
@@ -25,7 +25,8 @@ from studies.scene.library import CUT, JUDGED
 from studies.scene.scene import Scene
 
 MOST, TOLERANCE = 80e3, 0.002
-"""Of published nested references: finer than the plan of the scene, which a user can afford."""
+"""Unknowns and tolerance of published nested references: finer than the plans of the scenes, which are affordable for
+users."""
 PROCESSES = 2
 
 
@@ -46,14 +47,14 @@ def judged_scenes() -> dict[str, Scene]:
 
 
 def solved(work: tuple[str, str, float]) -> None:
-    """In a process: solves one scene of the catalogue, (name, folder, most unknowns)."""
+    """Run in a worker process: solves one scene of the catalogue; work: (name, folder, most unknowns)."""
     name, root, most = work
     solve(Path(root), ReferenceSolve(finer(judged_scenes()[name], most)))
 
 
 def publish(name: str, chosen: list[str], root: Path, most: float = MOST) -> Path:
     """Solves the chosen scenes below `root` and writes them as the set `name`, in which the others keep their files;
-    where its index lies. Raises StudyError for a scene that did not converge."""
+    returns the path of its index. Raises StudyError for a scene that did not converge."""
     for scene, _, cause in run_each([(scene, str(root), most) for scene in chosen], PROCESSES, solved):
         if cause is not None:
             raise StudyError(f"{scene[0]} was not solved: {cause}")
@@ -63,8 +64,8 @@ def publish(name: str, chosen: list[str], root: Path, most: float = MOST) -> Pat
 
 
 def write_published(folder: Path, name: str, references: Mapping[str, Reference]) -> Path:
-    """A set of references in a folder, by the names of their scenes; where its index lies. Others that are listed there
-    stay as they are."""
+    """A set of references in a folder, by the names of their scenes; returns the path of its index. Other entries of
+    the index do not change."""
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / INDEX
     listed = json.loads(path.read_text(encoding="utf-8"))["references"] if path.is_file() else {}

@@ -1,7 +1,7 @@
 """Published references: the finest solution of every scene of the catalogue, shipped with the package.
 
-A benchmark's truth is the same for everybody who is judged by it. A published reference stands for a scene as long as
-the physics are the same: organ, tissue, obstacles, holds and checkpoints; an edit of code makes none stale
+The reference of a benchmark must be the same for all users. A published reference is valid for a scene as long as the
+physics are the same: organ, tissue, obstacles, held regions and checkpoints. An edit of code makes none stale
 (`organbench verify --references` solves them again). A new set is a release with changed results.
 """
 
@@ -38,10 +38,10 @@ class Entry:
     """One published reference."""
 
     name: str
-    """Of the set, as "2027.1"."""
+    """Name of the set, as "2027.1"."""
     file: Path
     sha256: str
-    """Of the file."""
+    """SHA-256 of the file (hex)."""
 
     @property
     def words(self) -> str:
@@ -50,7 +50,7 @@ class Entry:
 
 
 def physics(scene: Scene) -> str:
-    """SHA-256 of what a reference of the scene depends on, however it is solved."""
+    """SHA-256 of everything in the scene on which its reference depends, independent of the solver."""
     plain = replace(physics_of(scene), name="", reference=None)
     return key_digest(json.dumps(with_floats(json.loads(scene_to_json(plain))), sort_keys=True, ensure_ascii=False))
 
@@ -65,7 +65,7 @@ def published(scene: Scene, folder: Path = FOLDER) -> Entry | None:
 
 @cache
 def index(folder: Path = FOLDER) -> Mapping[str, Entry]:
-    """The references in a folder by their physics, those whose file is as it was published."""
+    """The references in a folder by their physics, without missing or damaged files."""
     if not (folder / INDEX).is_file():
         return {}
     try:
@@ -94,7 +94,7 @@ def index(folder: Path = FOLDER) -> Mapping[str, Entry]:
 
 
 def fault_of(entry: Entry) -> str | None:
-    """What is wrong with the file; None where it is as it was published."""
+    """What is wrong with the file, "is missing" or "is damaged"; None if it is unchanged."""
     if not entry.file.is_file():
         return "is missing"
     digest = hashlib.sha256(entry.file.read_bytes()).hexdigest()
@@ -102,7 +102,8 @@ def fault_of(entry: Entry) -> str | None:
 
 
 def fingerprint_of(scene: Scene) -> str:
-    """What makes the scene's stored reference stale when it changes: the published file, or the code that solves it."""
+    """Hash whose change makes the stored reference of the scene stale: that of the published file, or of the code that
+    solves it."""
     entry = published(scene)
     return reference_fingerprint() if entry is None else f"published {entry.sha256}"
 

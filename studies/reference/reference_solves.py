@@ -1,4 +1,4 @@
-"""The reference of a scene as a job: what it depends on, and where it lies."""
+"""The reference of a scene as a job: its dependencies and its path."""
 
 import json
 from dataclasses import dataclass, replace
@@ -15,34 +15,34 @@ STUDY = "reference"
 
 @dataclass(frozen=True)
 class ReferenceSolve:
-    """All meshes of a scene's plan, and the settings made better on the coarsest."""
+    """The solutions on all meshes of a scene's plan, and with refined settings on the coarsest."""
 
     scene: Scene
 
     @property
     def name(self) -> str:
-        """For people and file names."""
+        """Name in messages and file names."""
         return self.scene.name
 
     @property
     def key(self) -> str:
-        """What the solution depends on, besides the code: not the frames; without motion not the damping or the
-        start."""
+        """Canonical JSON of everything except the code on which the solution depends. It leaves out the frames, and for
+        a scene without motion damping and start."""
         data = json.loads(scene_to_json(physics_of(self.scene)))
         return json.dumps({"scene": with_floats(data)}, sort_keys=True, ensure_ascii=False)
 
     @property
     def moves(self) -> bool:
-        """Whether it is a motion in time; a load path builds no mass."""
+        """Whether it is a motion in time; a load path has no inertia."""
         return self.scene.reference is not None and self.scene.reference.dt is not None
 
     def path(self, root: Path) -> Path:
-        """Where it lies."""
+        """Path of the stored reference."""
         return record_path(root, STUDY, self.name, self.key)
 
 
 def physics_of(scene: Scene) -> Scene:
-    """The scene without what its reference does not depend on."""
+    """The scene without fields on which its reference does not depend."""
     assert scene.reference is not None  # a reference solve belongs to a plan
     cuts = tuple(cut.at_once for cut in scene.cuts)
     plain = replace(scene, title="", duration=0.0, frames=0, quantities=(), not_for=(), cuts=cuts)
@@ -64,11 +64,12 @@ def reference_solves(scene: Scene) -> list[ReferenceSolve]:
 
 
 def settings_varied(scene: Scene) -> list[str]:
-    """The settings that matter in a scene: nothing touches, nothing sinks in."""
+    """The settings of the plan that matter in a scene: without contact the contact penalty does not."""
     assert scene.reference is not None
     return [name for name in scene.reference.variants if name != "contact" or scene.obstacles]
 
 
 def reference_fingerprint() -> str:
-    """Hash of the code that makes a reference and of all that it imports; what judges references is not among it."""
+    """Hash of the code that makes a reference and of all that it imports; without the code that computes their
+    uncertainty."""
     return source_fingerprint("studies.reference.solve", *MAKERS)

@@ -1,4 +1,4 @@
-"""The frequency at which a body rings after a start with speed."""
+"""The frequency of the vibration of a body that starts with a velocity."""
 
 import numpy as np
 from scipy.optimize import minimize_scalar
@@ -7,16 +7,16 @@ from studies.base.errors import StudyError
 from studies.scene.scene import Scene
 
 TRIALS = 400
-"""Frequencies tried before the best is refined: neighbours lie closer than the width of the minimum."""
+"""Number of trial frequencies before the best is refined; their spacing is less than the width of the minimum."""
 
 FEWEST = 12
-"""Values of a swing: three times as many as there are unknowns in it."""
+"""Fewest values of the signal for a fit: three times its number of unknowns."""
 
 
 def ringing_frequency(scene: Scene, t: np.ndarray, rest: np.ndarray, moved: np.ndarray, weights: np.ndarray) -> float:
-    """Of the displacements `moved` (K, n, 3) [m] of the points `rest` (n, 3) [m] at times t (K,) [s]; [Hz].
+    """Frequency [Hz] of the displacements `moved` (K, n, 3) [m] of the points `rest` (n, 3) [m] at times t (K,) [s].
 
-    The swing is the weighted projection on the velocities of the start. Raises StudyError without a start with speed.
+    The signal is the weighted projection on the initial velocities. Raises StudyError without a start with speed.
     """
     speed = None if scene.start is None else scene.start.velocities(rest)
     if speed is None:

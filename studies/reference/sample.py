@@ -1,4 +1,4 @@
-"""What one solution of a reference's family says, where it is compared with the others."""
+"""Samples: the quantities of one solution of a reference's family that are compared with the others."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -22,19 +22,19 @@ NO_PAIRS = np.empty((0, 2), dtype=np.int64)
 
 @dataclass(frozen=True, eq=False)
 class SamplePoints:
-    """Where solutions are compared: the vertices of the coarsest mesh, with their share of its rest volume and of its
-    surface."""
+    """The points at which solutions are compared: the vertices of the coarsest mesh, with their shares of its rest
+    volume and surface."""
 
     points: np.ndarray
     """[m], (b, 3)."""
     tetrahedra: np.ndarray
-    """Of the coarsest mesh, (d, 4)."""
+    """Tetrahedra of the coarsest mesh, (d, 4)."""
     symmetric: bool = False
-    """Whether the mesh is an octant: its planes of symmetry are no surface."""
+    """Whether the mesh is an octant, whose planes of symmetry do not belong to the surface."""
 
     @cached_property
     def triangles(self) -> np.ndarray:
-        """Of the surface, (s, 3)."""
+        """Triangles of the surface, (s, 3)."""
         triangles = boundary_triangles(self.tetrahedra)
         if not self.symmetric:
             return triangles
@@ -47,17 +47,17 @@ class SamplePoints:
 
     @cached_property
     def volumes(self) -> np.ndarray:
-        """[m³], (b,)."""
+        """Share of each vertex in the rest volume [m³], (b,)."""
         return _shares(self.tetrahedra, tetrahedron_volumes(self.points, self.tetrahedra), len(self.points))
 
     @cached_property
     def areas(self) -> np.ndarray:
-        """[m²], (b,)."""
+        """Share of each vertex in the surface area [m²], (b,)."""
         return _shares(self.triangles, triangle_areas(self.points, self.triangles), len(self.points))
 
 
 def _shares(corners: np.ndarray, sizes: np.ndarray, count: int) -> np.ndarray:
-    """What each vertex has of the sizes (k,) of elements with `corners` (k, c), (count,)."""
+    """Share of each vertex in the sizes (k,) of elements with `corners` (k, c), (count,)."""
     width = corners.shape[1]
     return np.bincount(corners.ravel(), np.repeat(sizes / width, width), count)
 
@@ -67,7 +67,7 @@ class Sample:
     """One solution at the sample points."""
 
     variant: str
-    """The setting that was made better, "" for a mesh of the family."""
+    """Name of the refined setting; "" for a mesh of the family."""
     unknowns: int
     size: float
     """Mean edge of the elements [m]; the error of meshes set by hand is a power of it."""
@@ -76,13 +76,13 @@ class Sample:
     force: np.ndarray
     """The probed force [N], (K,)."""
     volume: np.ndarray
-    """Over that at rest [1], (K,)."""
+    """Volume over rest volume [1], (K,)."""
     pressure: np.ndarray
-    """Volume mean, compression positive [Pa], (K,)."""
+    """Mean pressure over the volume, compression positive [Pa], (K,)."""
     lumen_pressure: np.ndarray
-    """[Pa], (K,)."""
+    """Pressure in the lumen [Pa], (K,)."""
     frequency: float = float("nan")
-    """Of the ringing [Hz]; NaN where nothing rings."""
+    """Frequency of the vibration [Hz]; NaN for a scene without one."""
     opening: np.ndarray = field(default_factory=lambda: np.empty((0, 3)))
     """Displacement in front of a cut less that behind it at the last checkpoint [m], at its sample points, (y, 3)."""
 
@@ -99,7 +99,8 @@ def sample_of(
     series["pressure"][-len(equilibria) :] = [mean_pressure(problem, e) for e in equilibria]
     if scene.filled:
         series["lumen_pressure"][-len(equilibria) :] = [float(e.cavity_pressure.sum()) for e in equilibria]
-    # Vertices come first in all meshes of a family; a place on a cut has two sides, and only numbers tell them apart.
+    # Vertices come first in all meshes of a family. A point on a cut has two nodes, which only their numbers
+    # distinguish.
     if scene.cuts or np.array_equal(nodes(problem.mesh)[: len(at.points)], at.points):
         moved = np.array([e.u[: len(at.points)] for e in equilibria])
     else:
@@ -153,7 +154,7 @@ def sample_fields(at: SamplePoints, samples: Sequence[Sample], checkpoints: int)
 
 
 def samples_in(scene: Scene, record: Record) -> tuple[SamplePoints, list[Sample]]:
-    """What `sample_fields` stored."""
+    """(sample points, samples) from the fields that `sample_fields` stored."""
     get = lambda name: record.fields[f"sample_{name}"].values  # noqa: E731
     at = SamplePoints(get("points"), get("tetrahedra"), scene.symmetric)
     return at, [

@@ -18,11 +18,11 @@ from studies.store.record import Record
 
 
 class _Remembering(Evaluator):
-    """Finds the same points in its mesh once: all runs on a mesh, and several quantities of each, ask for them. Of the
-    elements near a point it tries those that can be nearer than the nearest so far.
+    """An Evaluator that caches the points it has located, since all runs on a mesh and several metrics use the same
+    points. It tries only elements that can be nearer to a point than the nearest so far.
 
-    An Evaluator, which the solver of references has, tries them all, and believes an inverse map that did not converge:
-    of one point in some thousand.
+    The Evaluator of reference_fem tries all elements, and accepts an inverse map that did not converge, which happens
+    for one point in about a thousand.
     """
 
     def __init__(self, mesh: MeshTet2, among: np.ndarray | None = None) -> None:
@@ -38,14 +38,14 @@ class _Remembering(Evaluator):
         self.located: dict[bytes, tuple[np.ndarray, np.ndarray]] = {}
 
     def locate(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """As Evaluator's; `outside` is that of the points that were not known."""
+        """As Evaluator.locate; `outside` refers only to points that were not cached."""
         key = points.tobytes()
         if key not in self.located:
             self.located[key] = super().locate(points)
         return self.located[key]
 
     def improve(self, points: np.ndarray, open_: np.ndarray, count: int, places: tuple[np.ndarray, np.ndarray]) -> None:
-        """As Evaluator's, without the elements whose box is farther off than the nearest element so far."""
+        """As Evaluator.improve, without elements whose box is farther away than the nearest element so far."""
         element, local = places
         count = min(count, len(self.table))
         near = self.tree.query(points[open_], k=count)[1].reshape(len(open_), count)
@@ -55,7 +55,7 @@ class _Remembering(Evaluator):
         while (may := least < self.outside[open_][:, None]).any():
             some = np.flatnonzero(may.any(axis=1))
             at, where = may[some].argmax(axis=1), open_[some]
-            least[some, at] = np.inf  # once is enough
+            least[some, at] = np.inf  # one try is enough
             candidate = near[some, at]
             reference = self.invert(candidate, points[where])
             nearest = np.clip(reference, 0.0, 1.0)
@@ -75,16 +75,16 @@ class _Remembering(Evaluator):
 
 
 _EVALUATORS: WeakValueDictionary[tuple[bytes, ...], _Remembering] = WeakValueDictionary()
-"""By nodes, tetrahedra and the part of them that is searched: solutions that differ by a setting have one mesh, and
-several may be loaded twice."""
+"""Cache by nodes, tetrahedra and searched elements: solutions that differ only by a setting share a mesh, and a
+solution may be loaded twice."""
 
 
 OCTANTS = np.array(list(product((1.0, -1.0), repeat=3)))
 """Signs that mirror an octant into the whole body, (8, 3)."""
 NOTHING = 1e-9
-"""Of the body's size: nearer to an element a point is inside."""
+"""Distance from an element, over the size of the body, below which a point is inside."""
 BESIDE = 1e-3
-"""Of the body's size: so far from a cut a place is surely on one side of it."""
+"""Distance from a cut, over the size of the body, at which a point is surely on one side of it."""
 TURNED = [0, 2, 1, 5, 4, 3]
 """A six-node facet seen from its other side."""
 
@@ -93,12 +93,12 @@ class Boundary(NamedTuple):
     """The boundary of the whole body."""
 
     points: np.ndarray
-    """Nodes at rest [m], (n, 3); those inside the body are among them."""
+    """Rest positions of all nodes [m], (n, 3), including those inside the body."""
     facets: np.ndarray
     """Six nodes of each facet, outward, (f, 6): corners, then the nodes between first and second, second and third,
     third and first."""
     displacement: np.ndarray
-    """Of the nodes at the last checkpoint [m], (n, 3)."""
+    """Displacements of the nodes at the last checkpoint [m], (n, 3)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,9 +129,8 @@ class Solution:
 
     @cached_property
     def _evaluators(self) -> dict[int, Evaluator]:
-        """One for the whole body; of a body that is cut one for what is behind the plane and one for what is in front,
-        or for each part between the planes of several: a place on a cut is in two, and next to its mouth the nearest
-        element may be of the wrong one."""
+        """One evaluator for the whole body, or for a cut body one for each part between the planes of its cuts: a point
+        on a cut is in two parts, and next to the mouth of a cut the nearest element may be in the wrong part."""
         if not self.scene.cuts:
             return {0: self._evaluator(None)}
         middles = self.field("nodes")[self.field("tetrahedra")[:, :4]].mean(axis=1)
@@ -154,7 +153,7 @@ class Solution:
     def displacement(self, points: np.ndarray, checkpoint: int = -1) -> np.ndarray:
         """Displacement [m] of the material points `points` (m, 3) [m]; of an octant, mirrored.
 
-        Points are found in the mesh once: metrics of all runs on one mesh ask for the same.
+        Points are located only once, since metrics of all runs on a mesh use the same ones.
         """
         return self._mirrored(self.field("displacement")[[checkpoint]], points)[0]
 
@@ -179,7 +178,7 @@ class Solution:
         columns = nodal.transpose(1, 0, 2).reshape(nodes, 3 * count)
         values, side = np.empty((len(points), 3 * count)), sides_of(self.scene.cuts, points)
         for one in np.unique(side):
-            # Where no element is, planes meet outside of the body.
+            # A part without elements is where planes meet outside the body.
             evaluator = self._evaluators.get(int(one)) or self._evaluator(None)
             values[side == one] = evaluator.displacement(columns, (sign * points)[side == one])
         return sign * values.reshape(len(points), count, 3).transpose(1, 0, 2)
@@ -192,13 +191,14 @@ class Solution:
 
     @cached_property
     def boundary(self) -> Boundary:
-        """Where the reference knows the surface and its displacement exactly; of an octant all eight mirror images."""
+        """The boundary nodes and facets of the reference with their displacements; for an octant with all eight mirror
+        images."""
         nodes, moved, facets = self.field("nodes"), self.field("displacement")[-1], facet_nodes(self.mesh)
         if not self.scene.symmetric:
             return Boundary(nodes, facets, moved)
         part, count = self.outside(facets), len(nodes)
         every = [part if sign.prod() > 0 else part[:, TURNED] for sign in OCTANTS]
-        images = (OCTANTS[:, None, :] * nodes).reshape(-1, 3) + 0.0  # no -0, which is no 0 to `unique`
+        images = (OCTANTS[:, None, :] * nodes).reshape(-1, 3) + 0.0  # turns -0 into 0, which `unique` would keep apart
         points, first, new = np.unique(images, axis=0, return_index=True, return_inverse=True)
         facets = new.ravel()[np.vstack([facets + k * count for k, facets in enumerate(every)])]
         return Boundary(points, facets, (OCTANTS[:, None, :] * moved).reshape(-1, 3)[first])

@@ -1,4 +1,4 @@
-"""The reference of a scene: how it is solved and stored."""
+"""Solves the reference of a scene and stores it."""
 
 import time
 from collections.abc import Callable
@@ -61,12 +61,12 @@ VARIANTS: dict[str, Callable[[Problem, tuple[float, ...], NewtonSettings], Set]]
     "contact": stiffer_contact,
     "kappa": less_compressible,
 }
-"""By the name that a plan lists; how much better each makes its setting: studies.reference.uncertainty.FACTORS."""
+"""Refined settings by their names in a plan. The factors are in studies.reference.uncertainty.FACTORS."""
 
 
 def solve(root: Path, reference_solve: ReferenceSolve) -> Path:
-    """Solves the scene on all meshes of its plan and stores the finest, with what the others say of it; of a path that
-    breaks off what was reached. Raises StudyError for a mesh that cannot be made."""
+    """Solves the scene on all meshes of its plan and stores the finest solution, with its uncertainty from the others;
+    if a path breaks off, the part that was reached. Raises StudyError for a mesh that cannot be made."""
     scene, started = reference_solve.scene, time.monotonic()
     assert scene.reference is not None  # a reference solve belongs to a plan
     solution = solve_nested(scene, VARIANTS) if scene.reference.nested else solve_levels(scene)
@@ -93,7 +93,7 @@ def solve(root: Path, reference_solve: ReferenceSolve) -> Path:
 
 
 def solve_levels(scene: Scene) -> FamilySolution:
-    """The scene on each level of its plan, then the coarsest with each setting made better."""
+    """The solutions on each level of the scene's plan, then on the coarsest with each refined setting."""
     plan, times = scene.reference, scene.checkpoints
     assert plan is not None  # the scene has a reference
     runs = [(level, "") for level in plan.levels] + [(plan.levels[0], name) for name in settings_varied(scene)]
@@ -122,7 +122,7 @@ def solve_levels(scene: Scene) -> FamilySolution:
 
 
 def element_size(scene: Scene, level: float) -> float:
-    """Mean edge [m] of the mesh `level` of the scene's plan; of an octant the size away from the contact."""
+    """Mean edge [m] of the mesh `level` of the scene's plan; for an octant the size away from the contact."""
     if scene.symmetric:
         return level * float(scene.organ.parameters["radius"])
     mesh = reference_problem(scene, level).mesh

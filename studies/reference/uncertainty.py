@@ -1,4 +1,4 @@
-"""How far each quantity of a reference may be from the truth: shares of the mesh, load steps, contact and kappa.
+"""Uncertainty of each quantity of a reference: shares of the mesh, load steps, contact and kappa.
 
 Differences of solutions are taken at the vertices of the coarsest mesh, weighted with their rest volume or area.
 """
@@ -16,29 +16,28 @@ from studies.scene.quantities import allowed
 from studies.scene.scene import Scene
 
 FAMILY = 3
-"""Meshes that make an error bar, the finest ones; two make a large one."""
+"""Number of the finest meshes used for an error bar; with two the bar is large."""
 PENALTY_FACTOR, KAPPA_FACTOR, STEP_FACTOR = 3.0, 10.0, 2.0
-"""How much better a setting is made: stiffer contact with as much less penetration, bulk modulus, load steps."""
+"""Factors of the refined settings: contact stiffness and reciprocal penetration, bulk modulus, number of load steps."""
 FACTORS = {"steps": STEP_FACTOR, "contact": PENALTY_FACTOR, "kappa": KAPPA_FACTOR}
-"""By the name of the setting."""
+"""Factor by the name of the setting."""
 
 
 @dataclass(frozen=True)
 class Uncertainty:
-    """Of one quantity, relative to its size [1]."""
+    """Uncertainty of one quantity, relative to its size [1]."""
 
     shares: dict[str, float]
-    """"mesh" and the names of FACTORS."""
+    """Shares by source: "mesh" and the names of FACTORS."""
     order: float
-    """Observed order of convergence in the element size; NaN where it is not monotone (the spread then counts), and of
-    nested meshes, whose rate is taken as known."""
+    """Observed order of convergence in the element size; NaN if convergence is not monotone (the spread is then used),
+    and for nested meshes, whose rate is assumed."""
     shift: float
-    """How far the extrapolated value is from that of the finest mesh, which is the one compared with; 0 for nested
-    meshes."""
+    """Extrapolated value minus that of the finest mesh, with which runs are compared; 0 for nested meshes."""
 
     @property
     def total(self) -> float:
-        """The one number: root of the sum of the squares of the shares (docs, eq. 6.3)."""
+        """The combined uncertainty: root of the sum of the squares of the shares (docs, eq. 6.3)."""
         return combined(self.shares)
 
 
@@ -117,24 +116,24 @@ NUMBERS: dict[str, tuple[Measure, Callable[[Sample], np.ndarray]]] = {
     "frequency": (frequency, lambda sample: np.array([sample.frequency])),
     "lumen": (lumen, lambda sample: sample.lumen_pressure[-1:]),
 }
-"""Numbers and series of them: how a change is measured, and the values."""
+"""Numbers and series: (measure of a change, values of a sample)."""
 FIELDS: dict[str, tuple[Measure, Callable[[SamplePoints], np.ndarray]]] = {
     "surface": (surface, lambda at: at.areas),
     "interior": (interior, lambda at: at.volumes),
 }
-"""The displacement, with the weights of its points."""
+"""Displacement fields: (measure of a change, weights of the points)."""
 ABOUT_SURFACE: dict[str, Measure] = {"surface_mean": surface_mean, "silhouette": silhouette, "opening": opening}
-"""What is read off the displaced surface: on meshes set by hand it has the bar of its change from one mesh to the next,
-times how many times the change of the surface its own bar is."""
+"""Quantities derived from the displaced surface. On meshes set by hand their error bar is their change between two
+meshes times the ratio of bar to change of "surface"."""
 QUANTITIES: dict[str, Measure] = {name: m for name, (m, _) in (NUMBERS | FIELDS).items()} | ABOUT_SURFACE
-"""By the name that metrics use."""
+"""All measures by the name of the quantity in metrics."""
 
 
 def uncertainties(
     scene: Scene, at: SamplePoints, meshes: Sequence[Sample], variants: Mapping[str, Sample]
 ) -> dict[str, Uncertainty]:
-    """Uncertainty of every quantity on the finest of the meshes (fine to coarse), and by the settings that were made
-    better on the coarsest.
+    """Uncertainty of every quantity on the finest of the meshes (fine to coarse), and from the refined settings on the
+    coarsest.
 
     Raises StudyError without a coarser mesh.
     """
@@ -151,7 +150,8 @@ def uncertainties(
 
 
 def uncertainty_of_meshes(scene: Scene, at: SamplePoints, meshes: Sequence[Sample], name: str) -> MeshError:
-    """What the meshes leave of quantity `name`, relative to its size; fine to coarse, two or more."""
+    """The share of the mesh in the uncertainty of quantity `name`, relative to its size; meshes: fine to coarse, two or
+    more."""
     assert scene.reference is not None  # it was solved
     family = meshes[:FAMILY]
     finest = family[0]

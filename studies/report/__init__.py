@@ -1,1 +1,1 @@
-"""What people look at: charts, tables and the summary of a results folder."""
+"""Reports of a results folder: charts, tables and summaries."""

@@ -1,4 +1,4 @@
-"""How well every stored run kept its volumes: one table over all studies, written by `organbench report`."""
+"""The table of volume errors of all stored runs of all studies, written by `organbench report`."""
 
 from collections.abc import Mapping, Sequence
 from functools import partial

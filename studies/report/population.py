@@ -1,5 +1,5 @@
-"""What a population tells, as tables: errors of every body, the ten worst members of every organ taken apart, and how
-often the comparison of two meshes names a member whose error is too large."""
+"""Tables of a population: errors of every body, an analysis of the ten worst members of every organ, and how often the
+comparison of two meshes detects a member whose error is too large."""
 
 from collections.abc import Sequence
 
@@ -14,7 +14,7 @@ from studies.metrics.trust import ENOUGH, Judgement, judgements, tally
 from studies.store.record import Status
 
 WORST = 10
-"""Members of each organ that are taken apart."""
+"""Number of members of each organ that are analysed."""
 CHOSEN_ON = {"liver": 27, "kidney": 27, "stomach": 27, "spleen": 30, "bladder": 30}
 """Members of each organ, the first ones, on which the rule of the warning was chosen (studies.metrics.trust)."""
 NONE = "No results yet: run `make study-population`."

@@ -1,4 +1,4 @@
-"""What the repository shows: tables, charts and the summaries on its pages, from results that the present code made."""
+"""Publishes tables, charts and the summaries on pages of the repository, from results of the present code."""
 
 from collections.abc import Callable, Sequence, Set
 from dataclasses import dataclass
@@ -80,7 +80,7 @@ EXTRAS = {
     LEAGUE: Extra("make study-league", ("studies.exchange.peers.main", "studies.report.league.page", *ADAPTERS)),
     SWEEP: Extra("python -m studies.exchange.peers.main --sweep", ("studies.exchange.peers.main", *ADAPTERS)),
 }
-"""What was not made again stays as published."""
+"""Results that belong to no study; those that were not made again stay as published."""
 APART = (POPULATION,)
 """Studies outside of the catalogue: published when they are asked for, and kept meanwhile."""
 REFERENCES, KEPT = "reference", "kept_volume.csv"

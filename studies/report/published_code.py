@@ -1,5 +1,5 @@
-"""Which code makes what is published: noted when it is published, and compared with the present code by `organbench
-publish --check`."""
+"""Hashes of the code that made published results: recorded at publication, and compared with the present code by
+`organbench publish --check`."""
 
 import hashlib
 import json

@@ -1,4 +1,4 @@
-"""What is known of the references themselves: a table and a chart of their error bars."""
+"""A table and a chart of the error bars of all references."""
 
 import hashlib
 from collections.abc import Iterable, Mapping
@@ -29,7 +29,7 @@ def references_by_scene(references: References, scenes: Iterable[Scene]) -> dict
 
 
 def shape_of_reference(reference: Reference) -> ShapeErrors:
-    """How far the finest mesh of a reference, its sides as curved as they are, is from the true shape."""
+    """Deviation of the finest, curved mesh of a reference from the true shape."""
     points, facets, _ = reference.boundary
     return shape_errors(reference.scene.organ, rest_surfaces(points, facets), filled=True)
 
@@ -66,7 +66,7 @@ def state_of(*sources: str) -> str:
 
 
 def refresh_uncertainty(references: References, scenes: Iterable[Scene]) -> list[Path]:
-    """Writes table and chart of the error bars, unless they show what is stored; none where no reference is known."""
+    """Writes table and chart of the error bars, unless they are current; none if there is no reference."""
     each, root = list({scene.name: scene for scene in scenes}.values()), references.ledger.root
     folder = study_folder(root, STUDY)
     paths = [folder / TABLE, folder / CHART]

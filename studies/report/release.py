@@ -1,6 +1,6 @@
 """`python -m studies.report.release`: everything that is published, made by this commit on this machine, and published.
 
-Hours. What is current is not made again, so the same command goes on after an interruption.
+It takes hours. Current results are not made again, so the same command continues after an interruption.
 """
 
 import shlex
@@ -35,7 +35,7 @@ MINUTES = {
     "python -m studies.bench.meshes": 10.0,
     "python -m studies.tools.silicone.main": 10.0,
 }
-"""Rough, of two cores that do nothing else; how long a study takes its cases tell."""
+"""Approximate minutes on two otherwise idle cores; the time of a study follows from its cases."""
 FEW_MINUTES = 1.0
 """Of any other command."""
 CODE = ("massspring", "reference_fem", "studies", "pyproject.toml", "constraints.txt", "Makefile")

@@ -1,4 +1,4 @@
-"""What people look at: charts, tables as CSV, the summary of results that README shows."""
+"""Writes charts, tables as CSV, and the summary of results in README."""
 
 import json
 from collections.abc import Sequence
@@ -46,7 +46,7 @@ def draw_charts(root: Path, study: Study, runs: Sequence[Run]) -> list[Path]:
     for chart in study.charts:
         try:
             chart.draw(runs, folder / chart.file)
-        except Exception as error:  # a user's own chart may fail in any way
+        except Exception as error:  # a user's chart may raise any exception
             own = fault_of(error)
             if own is None and file_of(chart.draw) is not None:  # it could not even be called
                 own = f"its function fails: {type(error).__name__}: {error}"
@@ -160,7 +160,7 @@ def draw(loaded: Loaded, state: str) -> list[str]:
 
 
 def _stamped(stamp: Path) -> dict[str, Any]:
-    """What was drawn last; nothing when that is not known, or cannot be read: then it is drawn again."""
+    """The state that was drawn last; empty if it is missing or cannot be read, so that everything is drawn again."""
     try:
         before = json.loads(stamp.read_bytes())
     except (OSError, ValueError, RecursionError):

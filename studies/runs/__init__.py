@@ -1,1 +1,1 @@
-"""A case: described, prepared, run and judged."""
+"""Cases: their description, preparation, run and status."""

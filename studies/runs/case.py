@@ -1,4 +1,4 @@
-"""A case: scene × body recipe × method × time step, and its form as JSON, under which it is stored and found again."""
+"""A case: scene × body recipe × method × time step, and its JSON form, the key under which it is stored."""
 
 import json
 from collections.abc import Mapping
@@ -18,10 +18,10 @@ from studies.scene.scene import Scene
 
 Seconds = float | Literal["auto"]
 ADAPTIVE, ADAPTER = "adaptive", "studies.reference.adaptive_mesh"
-"""How a body of quadratic elements is graded by one solution of its coarse mesh, and the module that does it."""
+"""Value of `graded` for quadratic elements graded by one solution on a coarse mesh, and the module that computes it."""
 
 VIRTUAL = "virtual"
-"""How a body is cut through its cells."""
+"""Value of `cut` for a body that is cut through its cells."""
 
 
 @dataclass(frozen=True)
@@ -33,36 +33,36 @@ class BodyRecipe:
     surface of a hollow organ as a thin wall round its content; "quadratic": springs between all nodes of quadratic
     tetrahedra, which follow the true shape, with one volume per vertex."""
     nodes: int = 550
-    """Nodes on the outer surface; of a quadratic body mid-side nodes too, so that it has a quarter of them as vertices,
-    and of a graded one those that grading adds (within 5 %)."""
+    """Nodes on the outer surface. For a quadratic body mid-side nodes count, so a quarter of the nodes are vertices;
+    for a graded body nodes added by grading count (within 5 %)."""
     law: str = "van_gelder"
-    """Stiffness law: of a tetrahedral body of LAWS, of SMOOTHED or of one's own (`studies.own_law`), where springs
-    without length need nodal volumes; of a membrane "delingette" or "lloyd"."""
+    """Stiffness law. For a tetrahedral body: one of LAWS or SMOOTHED, or a user's law (`studies.own_law`); springs
+    without length need nodal volumes. For a membrane: "delingette" or "lloyd"."""
     stiffness: float = 1.0
     """Factor on every spring; 1 matches the tissue's shear modulus."""
     volumes: Literal["scene", "whole", "regions", "patches", "nodal"] = "scene"
-    """Which volumes are kept. "scene": those that physics keeps apart, the wall and a closed lumen of a hollow organ;
-    "whole": one, enclosed by the outer surface, as in the paper; "regions": `regions` parts; "nodal": one per node;
-    "patches": one for about eight nodes."""
+    """Which volumes are kept. "scene": those that are physically separate, the wall and a closed lumen of a hollow
+    organ; "whole": one, enclosed by the outer surface, as in the paper; "regions": `regions` parts; "nodal": one per
+    node; "patches": one for about eight nodes."""
     regions: int = 32
     """How many, where volumes is "regions"."""
     axis: Literal["straight", "centre_line"] = "straight"
-    """Of a surface body: "centre_line" follows a bent organ."""
+    """Axis of a surface body: "centre_line" follows a bent organ."""
     weights: tuple[float, float, float, float] | None = None
     """Of a surface body: relative stiffness of structural, bending, inner and axial springs; None for 1, ½, ½, 1."""
     graded: bool | Literal["adaptive"] = False
     """Whether elements are halved where the scene holds and touches the body (studies.meshing.graded_mesh), once at
-    outlines and twice at contacts, of a hollow organ once at contacts. Quadratic ones are shaped for outlines too.
-    "adaptive": quadratic elements are halved where one solution by reference elements has its largest errors
-    (studies.reference.adaptive_mesh)."""
+    outlines and twice at contacts, for a hollow organ once at contacts only. Mid-side nodes of quadratic elements are
+    also shifted towards outlines. "adaptive": quadratic elements are halved where one solution with reference elements
+    has its largest error indicators (studies.reference.adaptive_mesh)."""
     mass: Literal["lumped", "stiffness"] = "lumped"
-    """What resists the motion of a quadratic body: its mass, or the same in all, shared in proportion to the stiffness
-    at each node, for longer steps where inertia does not matter (studies.scene.inertia)."""
+    """Inertial mass of a quadratic body: its mass, or "stiffness": the same total mass, distributed in proportion to
+    the stiffness at each node, for longer steps if inertia does not matter (studies.scene.inertia)."""
     contact: Literal["facets", "nodes"] = "facets"
     """Where obstacles touch a quadratic body: at points inside its facets, or at its nodes, which is cheaper."""
     cut: Literal["conforming", "virtual"] = "conforming"
-    """How the body of a scene with a cut is cut: along faces of a mesh that was made for it, or through the cells of
-    any mesh, by virtual nodes (studies.meshing.virtual_mesh); the latter for tetrahedral bodies."""
+    """How the body of a scene with a cut is cut: along faces of a mesh that is made for it, or through the cells of any
+    mesh by virtual nodes (studies.meshing.virtual_mesh), for tetrahedral bodies only."""
 
     def __post_init__(self) -> None:
         lookup(self.law, law_names(), "stiffness law")
@@ -70,8 +70,8 @@ class BodyRecipe:
 
     @property
     def series(self) -> str:
-        """What sets it apart in charts and tables: its kind, whether it is graded, the volumes it keeps and its masses
-        where they were chosen."""
+        """Its label in charts and tables: kind, whether it is graded, volumes that it keeps, and masses if they are not
+        the default."""
         chosen = {
             "scene": "",
             "whole": ", one volume",
@@ -90,19 +90,19 @@ NEIGHBOURS = (0.94, 0.97, 1.0, 1.03, 1.06)
 
 
 def neighbours(body: BodyRecipe) -> tuple[BodyRecipe, ...]:
-    """The recipe on five meshes with nearly as many nodes. One mesh is one draw: errors of neighbours may differ
-    fourfold (docs/accuracy.md)."""
+    """The recipe on five meshes with nearly as many nodes. A single mesh is a random sample: errors of neighbours may
+    differ by a factor of four (docs/accuracy.md)."""
     return tuple(replace(body, nodes=round(share * body.nodes)) for share in NEIGHBOURS)
 
 
 LATER = {"weights": None, "graded": False, "mass": "lumped", "contact": "facets", "cut": "conforming"}
-"""Settings of a recipe that came after the first records, and what they were before."""
+"""Settings of a recipe that were added after the first records, with their earlier fixed values."""
 LATER_SETTINGS = {
     "implicit_volume": {"recovers": False},
     "explicit_elements": {"law": "neo_hookean"},
     "implicit_elements": {"law": "neo_hookean"},
 }
-"""The same of methods, by name."""
+"""The same for settings of methods, by name of the method."""
 
 
 @dataclass(frozen=True)
@@ -118,12 +118,12 @@ class Case:
     frames: int | None = None
     """Instead of the scene's number of frames; the duration stays."""
     beyond_limit: bool = False
-    """Whether a step above the stability limit is wanted; it is refused otherwise."""
+    """Whether a step above the stability limit is allowed; otherwise it is refused."""
     precision: Literal["float64", "float32"] = "float64"
-    """Of the mass-spring state; float32 for methods that claim it."""
+    """Precision of the mass-spring state; float32 only for methods that support it."""
     recorded: tuple[str, ...] = ()
-    """Fields that metrics do not read: of `massspring.run.history.EXTRA`, the energies; "surface", positions of
-    the outer surface for a replay (studies.runs.surface_frames)."""
+    """Additional fields that metrics do not use: the energies of `massspring.run.history.EXTRA`, and "surface",
+    positions of the outer surface for a replay (studies.runs.surface_frames)."""
     timed: bool = False
     """Whether frame times are measured by the timing protocol."""
 
@@ -192,7 +192,8 @@ def _settings(method: Method) -> list[str]:
 
 
 def case_to_dict(case: Case) -> dict[str, Any]:
-    """JSON-able form, without `timed`: measuring time changes no physics; `precision` and `recorded` where chosen."""
+    """JSON-able form, without `timed`, since timing does not change results; `precision` and `recorded` only if they
+    are not the default."""
     chosen: dict[str, Any] = {} if case.precision == "float64" else {"precision": case.precision}
     if case.recorded:
         chosen["recorded"] = list(case.recorded)
@@ -212,12 +213,13 @@ def case_to_dict(case: Case) -> dict[str, Any]:
 
 
 def _without(later: Mapping[str, Any], settings: Any) -> dict[str, Any]:
-    """JSON-able form; of what came `later` only what was chosen, so that records from before it could stay current."""
+    """JSON-able form of `settings`; those in `later` only if they differ from their earlier values, so that older
+    records stayed current."""
     return {name: value for name, value in asdict(settings).items() if name not in later or value != later[name]}
 
 
 def case_from_json(text: str) -> Case:
-    """The case of which `text` is the key. Raises StudyError when it is none."""
+    """The case with the key `text`. Raises StudyError if `text` is not the key of a case."""
     try:
         data = json.loads(text)
         case = Case(
@@ -254,7 +256,7 @@ def _strict(kind: type) -> TypeAdapter[Any]:
 
 
 def _unread(given: Any, understood: Any, where: str = "") -> list[str]:
-    """Names of the settings in `given` that did not arrive in `understood`."""
+    """Names of the settings in `given` that `understood` lacks."""
     if isinstance(given, dict) and isinstance(understood, dict):
         names = [(f"{where}.{name}" if where else name, name) for name in given]
         lost = [path for path, name in names if name not in understood]

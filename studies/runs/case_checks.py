@@ -1,4 +1,4 @@
-"""What the settings of a case may be, beyond what their scene, mesh and body say later."""
+"""Checks of the settings of a case that need neither mesh nor body."""
 
 import math
 from dataclasses import is_dataclass
@@ -35,7 +35,7 @@ def check_recipe(recipe: Any) -> None:
 
 
 def check_settings(case: Any) -> None:
-    """Raises StudyError for the first setting of a `studies.runs.case.Case` that is none."""
+    """Raises StudyError for the first invalid setting of a `studies.runs.case.Case`."""
     if isinstance(case.method, type) or not is_dataclass(case.method):
         name = getattr(case.method, "__name__", repr(case.method))
         raise StudyError(f"the method is {name}; give an object, such as Free()")

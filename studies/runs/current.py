@@ -1,4 +1,4 @@
-"""Where the record of a case lies, and the number of the code that makes it."""
+"""The path of the record of a case, and the hash of the code that makes it."""
 
 import hashlib
 from pathlib import Path
@@ -16,8 +16,8 @@ def run_fingerprint() -> str:
 
 
 def case_fingerprint(case: Case) -> str:
-    """Hash of the code that makes the run of a case: that, the user's files in which its method and law are, and of an
-    adaptive body the code that solves references."""
+    """Hash of the code that makes the run of a case: `run_fingerprint`, the user's files with its method and law, and
+    for an adaptive body the code that solves references."""
     parts = [file.fingerprint for file in files_of(case.method, case.body.law)]
     if case.body.graded == ADAPTIVE:
         parts.append(source_fingerprint(ADAPTER))
@@ -27,5 +27,5 @@ def case_fingerprint(case: Case) -> str:
 
 
 def case_path(root: Path, study: str, case: Case) -> Path:
-    """Where the record of a case lies."""
+    """Path of the record of a case."""
     return record_path(root, study, case.name, case.key)

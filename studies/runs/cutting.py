@@ -1,4 +1,4 @@
-"""The body of a scene after its cut, and the event that brings it into a run."""
+"""The body of a scene after its cut, and the event that introduces it into a run."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -21,19 +21,19 @@ from studies.scene.cut import Cut
 from studies.scene.scene import Scene
 
 LUMEN = "lumen"
-"""Name of the kept volume of what fills a hollow organ."""
+"""Name of the kept volume of the content of a hollow organ."""
 
 
 @dataclass(frozen=True, eq=False)
 class Opening:
-    """Where the body of a record was cut, in the numbers of the record."""
+    """The cut of the body of a record, by node numbers of the record."""
 
     frame: int
-    """Frames before it, or before it begins to advance."""
+    """Number of frames before the cut, or before it begins to advance."""
     faces: np.ndarray
     """Triangles of the surface behind the cut, (u, 3)."""
     pairs: np.ndarray
-    """Nodes behind it and in front of it, (p, 2)."""
+    """Nodes behind the cut and in front of it, (p, 2)."""
     parts: np.ndarray
     """The piece of the body that each kept volume is in, (m,)."""
 
@@ -47,8 +47,8 @@ def pieces_of(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
 
 
 def check_blades(scene: Scene, kind: str) -> None:
-    """Raises DoesNotApply where a cut of the scene ends inside a body of a `kind` that is a surface, or advances over
-    it, and where there are several."""
+    """Raises DoesNotApply for a surface body (`kind`) if a cut of the scene ends inside it or advances, or if there are
+    several cuts."""
     words = f"the surface body does not apply to scene '{scene.name}'"
     for cut in scene.cuts if kind == "surface" else ():
         if cut.until is not None:
@@ -68,14 +68,15 @@ def check_blades(scene: Scene, kind: str) -> None:
 
 
 def surface_pieces(body: Body, later: Opened, axis: str) -> Pieces:
-    """The paper's body after a cut that opened the filled mesh on whose surface it was made."""
+    """The paper's body after a cut that opened the filled mesh to whose surface it belongs."""
     count = later.mesh.surface_count
     assert isinstance(later.mesh, OrganMesh)  # that of a quadratic body has no surface body
     return cut_surface(body, later.mesh.points[:count], later.mesh.triangles, later.parent[:count], axis)
 
 
 def keeping_pieces(body: Body, volumes: Volumes | PointVolumes | None) -> Body:
-    """The body that keeps `volumes`; where these are the whole and it is in pieces, the volume of each."""
+    """The body that keeps `volumes`; if that is the whole volume and the body is in pieces, the volume of each
+    piece."""
     if volumes is not None:
         return body.keeping(volumes)
     cells = body.tetrahedra.astype(np.int64)
@@ -90,7 +91,7 @@ def keeping_pieces(body: Body, volumes: Volumes | PointVolumes | None) -> Body:
 
 
 def check_opens(scene: Scene, recipe: BodyRecipe) -> None:
-    """Raises StudyError for a body whose lumen no cut opens."""
+    """Raises StudyError for a body recipe with which a cut cannot open the lumen."""
     cut = next((cut for cut in scene.cuts if cut.opens_lumen), None)
     if cut is None:
         return
@@ -107,7 +108,7 @@ def check_opens(scene: Scene, recipe: BodyRecipe) -> None:
 
 
 def check_held(cuts: Sequence[Cut], body: Body, attachments: tuple[Attachment, ...]) -> None:
-    """Raises StudyError for a piece of the cut body that nothing holds, unless one of the cuts lets it go."""
+    """Raises StudyError for a piece of the cut body without held nodes, unless one of the cuts allows free pieces."""
     cells, points = (body.tetrahedra if len(body.tetrahedra) else body.triangles).astype(np.int64), body.rest
     held = np.concatenate([np.empty(0, np.int64), *(np.asarray(a.nodes) for a in attachments)])
     piece = pieces_of(points, cells)
@@ -126,8 +127,8 @@ def event_of(
     pairs: np.ndarray | None = None,
     growth: Growth | None = None,
 ) -> Event:
-    """The event at which one body becomes the other, whose nodes had the numbers `parent` (n',); `pairs`: whose faces
-    touch; `growth`: what it has beyond copies."""
+    """The event at which body `after` replaces `before`. `parent` (n',): the node before of each of its nodes; `pairs`:
+    nodes of faces that touch; `growth`: new nodes and springs beyond copies."""
     was, now = before.kept, after.kept
     ended = (was.names.index(LUMEN),) if LUMEN in was.names and LUMEN not in now.names else ()
     whole = was.count - len(ended)
@@ -149,7 +150,7 @@ def event_of(
 
 
 def check_virtual(scene: Scene) -> None:
-    """Raises DoesNotApply for a scene in which there is nothing that virtual nodes could cut."""
+    """Raises DoesNotApply for a scene that virtual nodes cannot cut."""
     if len(scene.cuts) > 1:
         raise DoesNotApply(
             f"virtual nodes do not apply to scene '{scene.name}', which has {len(scene.cuts)} cuts; take cut "

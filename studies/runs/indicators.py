@@ -1,5 +1,5 @@
-"""Signs that a result is not reliable although the run ended well: a body that may lock, pressures that
-alternate between neighbours, a force that sways while nothing outside moves."""
+"""Indicators that a result is not reliable although the run ended well: a body that may lock, pressures that alternate
+between neighbours, a force that varies while all loads are at rest."""
 
 import numpy as np
 from scipy.sparse import csr_array
@@ -10,18 +10,18 @@ from massspring.body.volumes import Volumes
 from studies.scene.scene import Scene
 
 ALTERNATES = 0.3
-"""Of the shear modulus: nodal volumes of pressed, clamped and sagging organs have .3 to 12, quadratic bodies .05 to
-.25, the most where the mesh is coarse for the gradient of the pressure."""
+"""Bound of the alternation of pressures, over the shear modulus. Nodal volumes of pressed, clamped and sagging organs
+have 0.3 to 12, quadratic bodies 0.05 to 0.25, the most if the mesh is coarse for the gradient of the pressure."""
 SWAYS = 0.01
-"""Of the force."""
+"""Bound of the variation of the force, over the force."""
 STILL_FRAMES = 20
-"""At the end of a run, over which a force may sway."""
+"""Frames at the end of a run over which the variation of the force is measured."""
 LOCKS = 2.0
-"""Unknowns for each kept volume: the continuum has three, a volume for each tetrahedron leaves .6."""
+"""Bound of the number of unknowns per kept volume. The continuum has three; one volume per tetrahedron gives 0.6."""
 
 
 def indicators(scene: Scene, body: Body, history: History, lumen: int) -> dict[str, float]:
-    """Attributes of a run (RUN_ATTRIBUTES); NaN where they mean nothing. lumen: its column, or −1."""
+    """Attributes of a run (RUN_ATTRIBUTES); NaN if they do not apply. lumen: column of the lumen, or −1."""
     pressure = history.pressure[history.good_frames - 1] if history.good_frames else history.pressure[:0]
     alternation = unlike_neighbours(pressure, neighbours(body.kept, lumen)) if len(pressure) else np.nan
     return {
@@ -62,9 +62,9 @@ def neighbours(kept: Volumes | PointVolumes, lumen: int) -> np.ndarray:
 
 
 def unlike_neighbours(pressure: np.ndarray, pairs: np.ndarray) -> float:
-    """Root mean square of what `pressure` (m,) differs by from the mean of its neighbours, `pairs` (e, 2), in its unit.
+    """Root mean square difference of `pressure` (m,) from the mean of its neighbours, `pairs` (e, 2), in its unit.
 
-    A gradient leaves it small, a checkerboard makes it twice its amplitude. NaN without a pair.
+    It is small for a gradient, and twice the amplitude for a checkerboard. NaN without pairs.
     """
     if not len(pairs):
         return float("nan")
@@ -76,8 +76,8 @@ def unlike_neighbours(pressure: np.ndarray, pairs: np.ndarray) -> float:
 
 
 def sway(scene: Scene, t: np.ndarray, contact_force: np.ndarray, held_force: np.ndarray) -> float:
-    """Range of the probed force about its straight trend, over its mean [1], in the last frames of those in which
-    nothing outside moves; NaN where there are fewer than three, or no force to compare.
+    """Range of the probed force about its straight trend, over its mean [1], over the last frames in which all loads
+    are at rest; NaN if there are fewer than three, or no force to compare.
 
     t: ends of the good frames [s], (f,); contact_force: (F, o, 3) [N], held_force: (F, g, 3) [N], F ≥ f.
     """
@@ -91,7 +91,7 @@ def sway(scene: Scene, t: np.ndarray, contact_force: np.ndarray, held_force: np.
 
 
 def still_from(scene: Scene) -> float:
-    """When the last path and the filling of a scene end [s]; infinity for one that starts in motion."""
+    """Time at which all paths and the filling of a scene have ended [s]; infinity for a scene that starts in motion."""
     if scene.start is not None:
         return float("inf")
     paths = [moving.path.times for moving in (*scene.obstacles, *scene.held)]

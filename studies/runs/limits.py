@@ -1,4 +1,4 @@
-"""What a run may ask of a machine: refused before it begins, with the numbers, when no machine could do it."""
+"""Limits on steps, memory and time of a run; a run beyond them is refused before it begins."""
 
 import math
 
@@ -6,27 +6,28 @@ from massspring import Body, StepLimit
 from studies.base.errors import StudyError
 
 TIME_LIMIT = 600.0
-"""Processor time after which a run is given up [s], checked between frames: ten times the longest case of the
+"""Processor time after which a run is stopped [s], checked between frames: ten times the longest case of the
 catalogue."""
 MOST_STEPS = 1e8
-"""A step takes a microsecond or more, whatever the body."""
+"""Most steps of a run: a step takes a microsecond or more for any body."""
 MOST_BYTES = 5e8
-"""That a run may record, or prepare for a frame: a hundred times what the largest case of the catalogue does."""
+"""Most bytes that a run may record, or prepare for a frame: a hundred times those of the largest case of the
+catalogue."""
 LEAST_NS = 0.3
-"""Time of a spring in a step [ns] that no processor stays below."""
+"""Lower bound of the time of a spring in a step [ns] on any processor."""
 NUMBER = 8
-"""Bytes."""
+"""Size of a number [bytes]."""
 
 
 def check_size(duration: float, frames: int, dt: float, limit: StepLimit, body: Body, around: int) -> None:
-    """Raises StudyError for a run of more steps, bytes or hours than can be had.
+    """Raises StudyError for a run with too many steps, too much memory, or too much time.
 
     duration, dt: [s]; around: obstacles and held regions.
     """
     if not math.isfinite(duration):
         raise StudyError(f"the duration is {duration} s; give a finite one")
     if not (dt > 0 and duration > 0 and frames >= 1):
-        return  # make_clock says it
+        return  # make_clock reports it
     volumes, nodes = body.kept.count, body.node_count
     recorded = NUMBER * frames * (3 * volumes + 4 * around + 4)
     if recorded > MOST_BYTES:

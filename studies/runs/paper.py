@@ -1,4 +1,4 @@
-"""The paper's scenes (Jung, Hong, Choi 2005) on its own bodies: what Figures 2 to 4 and docs/paper.md come from."""
+"""The paper's scenes (Jung, Hong, Choi 2005) on the paper's surface bodies, for Figures 2 to 4 and docs/paper.md."""
 
 from dataclasses import dataclass
 
@@ -38,7 +38,7 @@ def play(case: Case) -> Played:
 
 
 def ball_case(method: Method, nodes: int = BALL_NODES) -> Case:
-    """The squeezed ball of Figures 2 and 3 on the paper's surface body; 800 frames, its iterations."""
+    """The squeezed ball of Figures 2 and 3 on the paper's surface body; 800 frames, the iterations of the paper."""
     return Case(BALL_SQUEEZE, BodyRecipe("surface", nodes), method)
 
 
@@ -48,7 +48,7 @@ def slide_case(nodes: int = NODES, method: Method | None = None) -> Case:
 
 
 def squeezed_balls(nodes: int = BALL_NODES) -> dict[str, Played]:
-    """Without and with the constraint."""
+    """The squeezed ball without and with the constraint, both played."""
     return {method.name: play(ball_case(method, nodes)) for method in (Free(), ImplicitVolume())}
 
 
@@ -63,7 +63,7 @@ def moments(slide: Played) -> dict[str, int]:
 
 
 def tip_of(slide: Played, frame: int) -> np.ndarray:
-    """Where the probe's tip is at the end of frame number `frame` (0, 1, …) [m], (3,)."""
+    """Position of the probe's tip at the end of frame number `frame` (0, 1, …) [m], (3,)."""
     probe = slide.case.scene.obstacles[0]
     assert isinstance(probe, Probe)
     return probe.anchor + probe.path(float(slide.history.t[frame]))

@@ -1,4 +1,4 @@
-"""From a scene to the mass-spring solver: the mesh, the body, the set-up of a run."""
+"""Prepares a case for the mass-spring solver: mesh, body, set-up of the run."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -56,39 +56,41 @@ WHOLE = "whole"
 
 @dataclass(frozen=True, eq=False)
 class Prepared:
-    """All that a run needs, and what a report shows of it."""
+    """All data that a run and its record need."""
 
     mesh: OrganMesh
     setup: Setup
     limit: StepLimit
     opening: Opening | None = None
-    """Where the body is cut, if it is: `mesh` is the one after that."""
+    """The cut of the body, if there is one; `mesh` is then the mesh after the cut."""
     limit_before: StepLimit | None = None
-    """Of the step before that; `limit` is that of the whole run."""
+    """Step limit before the cut; `limit` is that of the whole run."""
     tissue: Tissue | None = None
-    """What is recorded of a body with virtual nodes: `mesh` is its mesh; None: the body itself."""
+    """Tissue of a body with virtual nodes, which is recorded and whose mesh is `mesh`; None: the body itself is
+    recorded."""
 
     @property
     def body(self) -> Body:
-        """The last body of the run: what is recorded has its numbers."""
+        """The last body of the run, whose node numbers the record uses."""
         return self.setup.events[-1].body if self.setup.events else self.setup.body
 
 
 def mesh_of(scene: Scene, recipe: BodyRecipe) -> OrganMesh | QuadraticMesh:
-    """The mesh that a recipe asks for. Raises StudyError."""
+    """The mesh for a recipe. Raises StudyError."""
     quadratic = recipe.kind == "quadratic"
     if recipe.cut == VIRTUAL:
-        scene = replace(scene, cuts=())  # the mesh does not know it
+        scene = replace(scene, cuts=())  # the mesh is made without the cut
     if recipe.graded == ADAPTIVE:
-        # No import leads there: what solves a reference makes no other run stale (studies.runs.current).
+        # Not imported statically, so that code that solves references does not make other runs stale
+        # (studies.runs.current).
         return import_module(ADAPTER).adaptive_mesh(scene, recipe.nodes)
     if recipe.graded or quadratic:
-        # Loaded where it is asked for: it brings the finite elements.
+        # Loaded on demand, since it imports the finite elements.
         from studies.meshing.graded_mesh import graded_mesh, usual_grading
 
         return graded_mesh(scene, recipe.nodes, *(usual_grading(scene) if recipe.graded else (0, 0)), quadratic)
-    # The paper's body of a hollow organ is its outer surface; what its content is, only the wall tells. A cut is meshed
-    # with the tissue on either side.
+    # The paper's body of a hollow organ is only its outer surface; the density of the content needs the wall. A cut is
+    # meshed with the tissue on both sides.
     inside = scene.lumen is not None or bool(scene.cuts)
     return mesh_for(scene, recipe.nodes, filled=recipe.kind == "tetrahedral" or inside)
 
@@ -125,20 +127,21 @@ def body_for(
 
 
 def wall_for(scene: Scene, recipe: BodyRecipe, mesh: OrganMesh, material: Material) -> Body:
-    """A hollow organ as a membrane on its outer surface, as thick as its wall is in the mean. Raises StudyError."""
+    """A hollow organ as a membrane on its outer surface, with the mean thickness of its wall. Raises StudyError."""
     if not mesh.hollow:
         raise StudyError(f"scene '{scene.name}' has a solid organ; a membrane is for the wall of a hollow one")
     if recipe.law not in MEMBRANE_LAWS:
         raise StudyError(f"law '{recipe.law}' is not for membranes; choose {' or '.join(MEMBRANE_LAWS)}")
     outside = mesh.outer()
     thickness = mesh.volume / triangle_areas(outside.points, outside.triangles).sum()
-    # What fills the organ weighs as much as tissue, as in a surface body.
+    # The content has the density of the tissue, as in a surface body.
     content = material.density * (1.0 - mesh.volume / mesh.outer_volume)
     return membrane_body(outside.points, outside.triangles, float(thickness), material, recipe.law, content)
 
 
 def volumes_for(scene: Scene, recipe: BodyRecipe, mesh: OrganMesh, body: Body) -> Volumes | None:
-    """The volumes a recipe asks for; None for the tissue as a whole. Raises MassSpringError for what a body has not."""
+    """The kept volumes of a recipe; None for the tissue as a whole. Raises MassSpringError for volumes that the body
+    does not have."""
     surfaces = {}
     if recipe.kind == "tetrahedral" and mesh.hollow and scene.filled:
         if recipe.volumes == "whole":
@@ -156,13 +159,13 @@ def volumes_for(scene: Scene, recipe: BodyRecipe, mesh: OrganMesh, body: Body) -
 
 
 def targets_for(scene: Scene, mesh: OrganMesh, body: Body) -> dict[str, Ramp]:
-    """How the kept volumes change when the lumen is filled."""
+    """Targets of the kept volumes when the lumen is filled."""
     if scene.lumen is None or set(scene.lumen.filling.values) == {1.0}:
         return {}
     filling = scene.lumen.filling
     if LUMEN in body.kept.names:
         return {LUMEN: filling}
-    # One volume for wall and content grows by what the content grows.
+    # A single volume of wall and content grows by the growth of the content.
     share = mesh.lumen_volume / (mesh.lumen_volume + mesh.volume)
     return {body.kept.names[0]: Ramp(filling.times, tuple(1.0 + share * (f - 1.0) for f in filling.values))}
 
@@ -173,8 +176,8 @@ def attachments_for(scene: Scene, mesh: OrganMesh) -> tuple[Attachment, ...]:
 
 
 def check_applies(case: Case, body: Body, targets: bool) -> None:
-    """Raises DoesNotApply for a body, or surroundings in the scene, that the method does not run with; `targets`:
-    whether a kept volume is to change."""
+    """Raises DoesNotApply for a body, or surroundings in the scene, that the method does not support; `targets`:
+    whether there are targets of kept volumes."""
     scene, method = case.scene, case.method
     reason = method.why_not(body)
     if reason is not None:
@@ -201,14 +204,14 @@ def prepare(case: Case) -> Prepared:
     check_opens(scene, case.body)
     check_blades(scene, case.body.kind)
     mesh = mesh_of(scene, case.body)
-    from studies.meshing.kept_shape import tell_shape  # with the finite elements
+    from studies.meshing.kept_shape import tell_shape  # imports the finite elements
 
     tell_shape(scene, mesh, filled=case.body.kind in ("tetrahedral", "quadratic"))
     return prepared_on(case, mesh)
 
 
 def prepared_on(case: Case, mesh: OrganMesh | QuadraticMesh) -> Prepared:
-    """The same on a mesh that is there. Raises StudyError, MassSpringError."""
+    """The same on a given mesh. Raises StudyError, MassSpringError."""
     scene = case.scene
     if case.body.cut == VIRTUAL:
         check_virtual(scene)
@@ -248,8 +251,8 @@ def prepared_on(case: Case, mesh: OrganMesh | QuadraticMesh) -> Prepared:
 def cut_of(
     case: Case, mesh: OrganMesh | QuadraticMesh, body: Body, targets: bool
 ) -> tuple[tuple[Event, ...], Opening, OrganMesh, Tissue | None]:
-    """The events at which the cuts open a body on its mesh, where it was cut in the end, the mesh then, and of a body
-    with virtual nodes its tissue. Raises StudyError, MassSpringError."""
+    """(events at which the cuts open a body on its mesh, the final Opening, the final mesh, the tissue of a body with
+    virtual nodes). Raises StudyError, MassSpringError."""
     scene, recipe = case.scene, case.body
     ways = [event_frames(scene, cut, case.frames or scene.frames) for cut in scene.cuts]
     frames = sorted(set().union(*ways))
@@ -272,7 +275,7 @@ def cut_of(
             parent, flat = parents(cells, cells_of(stage.mesh)), flat_mesh(stage.mesh, last)
             cells = cells_of(stage.mesh)
         check_applies(case, last, targets)
-        touching = stage.pairs if scene.cuts[0].contact else None  # all touch, or none
+        touching = stage.pairs if scene.cuts[0].contact else None  # either all cuts have contact or none
         events.append(event_of(frame, before, last, parent, attachments_for(scene, flat), touching, growth))
     check_held(scene.cuts, last, events[-1].attachments)
     whole = next(stage for stage in reversed(stages) if stage is not None)
@@ -282,7 +285,7 @@ def cut_of(
 
 
 def _share(frame: int, first: int, last: int) -> float:
-    """Of the way of a cut after so many frames, −1 before its first event."""
+    """Share of the path of a cut after `frame` frames; −1 before its first event."""
     return -1.0 if frame < first else 1.0 if frame >= last else (frame - first) / (last - first)
 
 
@@ -291,12 +294,12 @@ def _stages(
 ) -> Sequence[Opened | VirtualMesh | None]:
     """The mesh at each event, along its faces or through its cells. Raises StudyError."""
     if recipe.cut == VIRTUAL:
-        assert isinstance(mesh, OrganMesh)  # of a tetrahedral body
-        return [virtual_mesh(mesh, scene.cuts[0])]  # check_virtual has seen that it is the only one
+        assert isinstance(mesh, OrganMesh)  # the body is tetrahedral
+        return [virtual_mesh(mesh, scene.cuts[0])]  # check_virtual has checked that there is only one
     return opened_in_stages(mesh, scene.cuts, shares)
 
 
 def limit_of(case: Case, body: Body, attachments: tuple[Attachment, ...]) -> StepLimit:
-    """The step limit of a case with a body held so. Raises MassSpringError."""
+    """The step limit of a case for a body with these attachments. Raises MassSpringError."""
     held = np.concatenate([a.nodes for a in attachments]) if attachments else None
     return step_limit(body, case.scene.damping, held, case.method.added_stiffness(body))

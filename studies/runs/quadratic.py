@@ -1,4 +1,4 @@
-"""From the quadratic mesh of a scene to its mass-spring body."""
+"""Makes the mass-spring body of a quadratic mesh."""
 
 from massspring import Body, Material, quadratic_body
 from studies.base.errors import DoesNotApply
@@ -10,7 +10,7 @@ from studies.scene.scene import Scene
 
 
 def check_masses(scene: Scene, recipe: BodyRecipe) -> None:
-    """Raises DoesNotApply for masses that are not the tissue's in a scene where they matter."""
+    """Raises DoesNotApply for masses other than those of the tissue in a scene in which inertia matters."""
     reason = why_inertia_matters(scene) if recipe.mass == "stiffness" else None
     if reason is not None:
         raise DoesNotApply(f"masses by stiffness do not apply to scene '{scene.name}': {reason}")
@@ -19,7 +19,7 @@ def check_masses(scene: Scene, recipe: BodyRecipe) -> None:
 def quadratic_for(scene: Scene, recipe: BodyRecipe, mesh: QuadraticMesh) -> Body:
     """The body of quadratic tetrahedra with one volume per vertex, and one for a lumen that is filled and closed.
 
-    Raises MassSpringError for a mesh that makes no body.
+    Raises MassSpringError for a mesh that gives no valid body.
     """
     material = Material(recipe.stiffness * scene.tissue.shear_modulus, scene.tissue.density)
     lumen = mesh.lumen if scene.filled and mesh.hollow else None
@@ -27,7 +27,7 @@ def quadratic_for(scene: Scene, recipe: BodyRecipe, mesh: QuadraticMesh) -> Body
 
 
 def flat_mesh(mesh: OrganMesh | QuadraticMesh, body: Body) -> OrganMesh:
-    """The flat triangles and tetrahedra that stand for curved elements where a body touches and is measured."""
+    """The mesh of flat triangles and tetrahedra that replace curved elements in contact and measurement."""
     if isinstance(mesh, OrganMesh):
         return mesh
     return OrganMesh(

@@ -1,4 +1,5 @@
-"""All of a case but its scene as a short text, from which it is made again: how a table names what a row was."""
+"""The recipe of a case: all settings except the scene, as a short text in tables from which the case can be made
+again."""
 
 import json
 from typing import Any
@@ -9,16 +10,16 @@ from studies.scene.scene import Scene
 
 
 def recipe_text(case: Case) -> str:
-    """JSON of the settings that are not those of `Case(scene)`: '{"body": {"kind": "quadratic", "nodes": 794}}'.
+    """JSON of the settings that differ from those of `Case(scene)`: '{"body": {"kind": "quadratic", "nodes": 794}}'.
 
-    Additional recorded fields are left out: it changes no number of a table."""
+    Additional recorded fields are left out, since they change no number of a table."""
     usual, given = _parts(Case(case.scene)), _parts(case.replaced(recorded=()))
     differing = {name: value for name, value in given.items() if value != usual.get(name)}
     return json.dumps({name: _chosen(value, usual.get(name)) for name, value in differing.items()})
 
 
 def case_of_recipe(scene: Scene, text: str) -> Case:
-    """The case of which `text` is the recipe in a scene. Raises StudyError when it is none."""
+    """The case with recipe `text` in a scene. Raises StudyError if `text` is not a recipe."""
     try:
         chosen = json.loads(text)
     except (TypeError, ValueError) as error:
@@ -33,7 +34,7 @@ def case_of_recipe(scene: Scene, text: str) -> Case:
 
 
 def body_words(body: BodyRecipe) -> str:
-    """A body as tables for people name it: "graded quadratic, masses by stiffness, 794"."""
+    """Name of a body in tables: "graded quadratic, masses by stiffness, 794"."""
     law = "" if body.law in ("van_gelder", "cotangent") else f", {body.law}"
     return f"{body.series}{law}, {body.nodes}"
 
@@ -43,7 +44,7 @@ def _parts(case: Case) -> dict[str, Any]:
 
 
 def _chosen(value: Any, usual: Any) -> Any:
-    """Of a body only what was chosen; a method whole: its settings are its own."""
+    """Settings that differ from `usual`; of a body field by field, of a method all of them."""
     if not isinstance(value, dict) or "name" in value:
         return value
     return {name: item for name, item in value.items() if item != usual.get(name)}

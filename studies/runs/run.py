@@ -1,4 +1,5 @@
-"""One case: prepared, simulated, judged, stored. Whatever happens is a result; only a full disk is not."""
+"""Runs one case: prepares, simulates, determines the status, stores the record. Any failure is recorded as a result;
+only a failure to store raises."""
 
 import json
 import time
@@ -29,13 +30,14 @@ from studies.store.schema import RUN_FIELDS
 OWN_FILES = "own_files"
 """Attribute of a run: the user's files that it was made with, as JSON {path: SHA-256}."""
 DRIFT = 0.01
-"""A method that keeps the volume and is this far from it has drifted: thirty times what the worst claims allow."""
+"""Relative volume error beyond which a method that keeps the volume has status "drifted": thirty times the error that
+the weakest claim allows."""
 
 
 def run_case(root: Path, study: str, case: Case, on_frame: Callable[[int], object] | None = None) -> Path:
-    """Runs a case and stores what came of it, a failure too, with the seconds that it took without compiling.
+    """Runs a case and stores its record, also for a failure, with the time that it took without compiling [s].
 
-    Raises StudyError only when it cannot be stored."""
+    Raises StudyError only if the record cannot be stored."""
     path = case_path(root, study, case)
     started = time.perf_counter()
     with watching() as watch:
@@ -46,19 +48,19 @@ def run_case(root: Path, study: str, case: Case, on_frame: Callable[[int], objec
 
 
 def measure(case: Case, on_frame: Callable[[int], object] | None = None) -> Record:
-    """The record of a case; what preparing it warned of is its attribute `warnings`."""
+    """The record of a case; its attribute `warnings` holds the warnings of its preparation."""
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", UserWarning)
         try:
             prepared = prepare(case)
-            # Attachments that overlap, or hold no node, show only when the run starts.
+            # Attachments that overlap, or hold no node, are detected only when the run starts.
             extra = [name for name in case.recorded if name in EXTRA]
             history = simulate(prepared.setup, snapshot_frames(case, prepared), on_frame, TIME_LIMIT, extra)
         except DoesNotApply as reason:
             return _record(case, Status.SKIPPED, str(reason), {"warnings": _warning_text(caught)}, {})
         except (StudyError, MassSpringError) as error:
             return _record(case, Status.FAILED, str(error), {"warnings": _warning_text(caught)}, {})
-        except Exception as error:  # code of a user may fail in any way
+        except Exception as error:  # a user's code may raise any exception
             own = fault_of(error)
             if own is None:
                 raise
@@ -81,19 +83,20 @@ def checkpoint_frames(case: Case, prepared: Prepared) -> list[int]:
 
 
 def snapshot_frames(case: Case, prepared: Prepared) -> list[int]:
-    """Numbers of the frames after which positions are kept: at checkpoints, and where the surface is recorded."""
+    """Numbers of the frames after which positions are kept: those at checkpoints, and those at which the surface is
+    recorded."""
     at = checkpoint_frames(case, prepared)
     return moments(prepared.setup.clock.frames, at) if "surface" in case.recorded else at
 
 
 def judge(case: Case, prepared: Prepared, history: History) -> tuple[Status, str]:
-    """How the run ended, and in a sentence why."""
+    """The status of the run, and a sentence on the reason."""
     if history.outcome != "finished":
         return Status(history.outcome), history.message
     smallest = float(history.min_j[-1])
     if smallest <= 0:
         return Status.INVERTED, f"an element is inverted at the end (smallest volume ratio {smallest:.3g})"
-    # A body that starts with a wrong volume is judged by the one it ends with.
+    # For a body that starts with a volume error only the final volume counts.
     since = 0 if case.scene.start is None else -1
     drift = float(np.max(np.abs(history.volume[since:] / history.volume_target[since:] - 1)))
     if case.method.volume_tol is not None and drift > DRIFT:
@@ -141,7 +144,7 @@ def _attributes(prepared: Prepared, history: History) -> dict[str, float | int |
 
 
 def _event_attributes(prepared: Prepared, history: History) -> dict[str, float]:
-    """What a cut did, at the worst of its events; of a run that ended before it what it would do to the step alone."""
+    """The effects of a cut, the largest over its events; for a run that ended before it only its effect on the step."""
     before = prepared.limit_before
     assert before is not None  # it is cut
     attributes = {"cut_limit_ratio": prepared.limit.damped / before.damped, "cut_events": len(prepared.setup.events)}
@@ -184,7 +187,7 @@ def _fields(case: Case, prepared: Prepared, history: History) -> dict[str, Field
 
 
 def _shown(prepared: Prepared, x: np.ndarray) -> dict[str, np.ndarray]:
-    """The nodes of a body with positions `x` (K, n, 3) [m]; of one with virtual nodes the places of its tissue."""
+    """Recorded positions for a body at `x` (K, n, 3) [m]: its nodes, or with virtual nodes the points of its tissue."""
     body, tissue = prepared.body, prepared.tissue
     if tissue is None:
         names = ("rest", "mass", "triangles", "tetrahedra")
@@ -202,12 +205,12 @@ def _shown(prepared: Prepared, x: np.ndarray) -> dict[str, np.ndarray]:
 
 
 def own_files_of(record: Record) -> dict[str, str]:
-    """The user's files that a run was made with: path -> SHA-256 of its content then."""
+    """The user's files with which a run was made: path -> SHA-256 of the content at that time."""
     return json.loads(str(record.attributes.get(OWN_FILES) or "{}"))
 
 
 def replay(path: Path) -> tuple[Record, Record, str | None]:
-    """Runs the case stored in `path` again: (stored, new, how they differ or None when every value is equal)."""
+    """Runs the case stored in `path` again: (stored, new, first difference or None if all values are equal)."""
     stored = read_record(path)
     if stored.kind != "run":
         raise StudyError(f"{path} holds a {stored.kind}, only a run can be replayed")
@@ -226,7 +229,7 @@ def difference(stored: Record, new: Record) -> str | None:
         if new.fields[name].values.shape != field.values.shape:
             return f"'{name}' has another shape"
         if not np.array_equal(field.values, new.fields[name].values, equal_nan=field.values.dtype.kind == "f"):
-            # As numbers with a sign: indices are stored without one.
+            # As signed numbers, since indices are stored unsigned.
             gap = float(np.nanmax(np.abs(field.values - new.fields[name].values.astype(float))))
             return f"'{name}' differs by up to {gap:.3g} {field.unit}"
     return None

@@ -1,4 +1,4 @@
-"""Positions of the outer surface at moments of a run, where a case asks for them: what a replay shows."""
+"""Positions of the outer surface at several times of a run, for a replay, if a case records them."""
 
 import numpy as np
 
@@ -7,7 +7,7 @@ from studies.runs.prepare import Prepared
 from studies.store.schema import SURFACE
 
 MOMENTS = 60
-"""Over the duration, in even steps; in addition the start, the checkpoints and the last frame."""
+"""Number of evenly spaced times over the duration; start, checkpoints and last frame are added."""
 
 
 def moments(frames: int, checkpoints: list[int]) -> list[int]:
@@ -25,7 +25,7 @@ def surface_fields(prepared: Prepared, history: History) -> dict[str, np.ndarray
     nodes = np.unique(prepared.mesh.outer_triangles)
     start = prepared.body.rest if setup.positions is None else setup.positions
     frames, seen = [0, *history.snapshot_frames], [start, *history.snapshots]
-    if frames[-1] < history.good_frames:  # an early end between two moments
+    if frames[-1] < history.good_frames:  # the run ended between two of these times
         frames.append(history.good_frames)
         seen.append(history.final)
     places = np.array(seen) if prepared.tissue is None else prepared.tissue.places(np.array(seen))

@@ -1,8 +1,8 @@
-"""Python files of a user: loaded only where the user names them, with the methods and stiffness laws that they add.
+"""Loads Python files of a user, only those that the user names, and registers their methods and stiffness laws.
 
 A file is identified by the SHA-256 of its bytes, of the modules next to it that it imports, and of the code of this
-project that these import. The name of its module holds that state, for numba stores compiled functions under the name
-of their module: a compiled loop of a user never comes from other code.
+project that these import. The name of its module contains this hash, since numba stores compiled functions under the
+name of their module. So a compiled loop always belongs to the current code.
 """
 
 import hashlib
@@ -27,16 +27,16 @@ from studies.base import interrupts
 from studies.base.errors import StudyError
 
 PREFIX = "organbench_own_"
-"""Of the names of their modules."""
+"""Prefix of the names of their modules."""
 AGAIN = "; correct it and run again"
-"""Ends the sentence about a faulty file."""
+"""End of the message about a faulty file."""
 Given = tuple[str, bytes]
-"""Path and content of a file: a worker gets both, so that it runs what this process has read."""
+"""(path, content) of a file. A worker receives both, so that it runs what this process has read."""
 
 
 @dataclass(frozen=True)
 class UserCode:
-    """A file of a user, as it was when it was read."""
+    """A file of a user, with its content when it was read."""
 
     path: Path
     content: bytes
@@ -45,7 +45,7 @@ class UserCode:
 
     @property
     def sha256(self) -> str:
-        """Of its bytes (hex)."""
+        """SHA-256 of its bytes (hex)."""
         return hashlib.sha256(self.content).hexdigest()
 
     @property
@@ -60,7 +60,7 @@ _LAWS: dict[str, StiffnessLaw] = {}
 
 
 def read_code(path: Path, content: bytes | None = None) -> UserCode:
-    """The file at `path`, which is not run; `content` replaces what it holds now. Raises OSError."""
+    """Reads the file at `path` without running it; `content` replaces its present content. Raises OSError."""
     path = path.resolve()
     content = path.read_bytes() if content is None else content
     digest = hashlib.sha256()
@@ -70,8 +70,8 @@ def read_code(path: Path, content: bytes | None = None) -> UserCode:
 
 
 def _parts(path: Path, content: bytes) -> Iterator[bytes]:
-    """Names and bytes of the file and of the modules next to it; then the state of the project's modules that any of
-    them imports, and of all methods, for `from massspring import ...` may lead to each of them."""
+    """Names and bytes of the file and of the modules next to it; then the hash of the project's modules that any of
+    them imports, and of all methods, since `from massspring import ...` may load any of them."""
     waiting, seen, ours = [(path, content)], {path}, {"massspring.methods"}
     while waiting:
         file, text = waiting.pop()
@@ -79,7 +79,7 @@ def _parts(path: Path, content: bytes) -> Iterator[bytes]:
         yield text
         try:
             imports = read_source(text, file.stem, file).imports
-        except MassSpringError:  # no Python: loading it says so
+        except MassSpringError:  # not valid Python: loading it reports that
             continue
         for module, name in imports:
             ours.update(part for part in (module, f"{module}.{name}") if own_file(part) is not None)
@@ -98,7 +98,7 @@ def _beside(folder: Path, name: str) -> list[Path]:
 
 
 def load_file(path: Path) -> ModuleType:
-    """Runs a user's file; its module. Raises StudyError, for whatever is wrong with it."""
+    """Runs a user's file and returns its module. Raises StudyError for any fault in the file."""
     try:
         return _loaded(read_code(path))
     except OSError as error:
@@ -106,13 +106,13 @@ def load_file(path: Path) -> ModuleType:
 
 
 def given_files(cases: Iterable[Any]) -> tuple[Given, ...]:
-    """The files that cases (studies.runs.case) need, for workers."""
+    """The user's files that cases (studies.runs.case) need, for workers."""
     files = {file for case in cases for file in files_of(case.method, case.body.law)}
     return tuple(sorted((str(file.path), file.content) for file in files))
 
 
 def load_given(files: tuple[Given, ...]) -> None:
-    """In a worker: the files of the process that started it, under the same names. Raises StudyError."""
+    """Run in a worker: loads the files of the process that started it, under the same names. Raises StudyError."""
     for path, content in files:
         _loaded(read_code(Path(path), content))
 
@@ -120,12 +120,12 @@ def load_given(files: tuple[Given, ...]) -> None:
 def _loaded(file: UserCode) -> ModuleType:
     module = ModuleType(file.module)
     module.__file__ = str(file.path)
-    sys.modules[file.module] = module  # its own dataclasses look themselves up there
+    sys.modules[file.module] = module  # dataclasses in the file look up their module there
     _LOADED[file.module] = file
     try:
-        # A loader of importlib would read the file a second time, or take a compiled one of the same second.
+        # A loader of importlib would read the file again, or use a compiled file from the same second.
         exec(compile(file.content, str(file.path), "exec"), vars(module))
-    except BaseException as error:  # the file of a user may fail in any way, and may leave by sys.exit
+    except BaseException as error:  # a user's file may raise any exception, including SystemExit
         if isinstance(error, KeyboardInterrupt) and (interrupts.pressed() or not interrupts.are_heard()):
             raise
         raise StudyError(f"{file.path.name} cannot be loaded: {_fault(file.path, error)}{AGAIN}") from error
@@ -143,20 +143,20 @@ def file_of(thing: object) -> UserCode | None:
 
 @cache
 def _file_of_module(name: str) -> UserCode | None:
-    """Of a module that the user's Python itself has imported."""
+    """The file of a module that the user's program has imported itself."""
     file = getattr(sys.modules.get(name), "__file__", None)
     return read_code(Path(file)) if file is not None and Path(file).is_file() else None
 
 
 def files_of(method: Method, law: str) -> tuple[UserCode, ...]:
-    """The files of the user that a method and the law of this name are in, each once."""
+    """The user's files that define a method and the law of this name, each once."""
     things = [type(method), *([_LAWS[law].stiffness] if law in _LAWS else [])]
     return tuple({file.path: file for file in map(file_of, things) if file is not None}.values())
 
 
 def fault_of(error: BaseException) -> str | None:
-    """ "mine.py fails: ZeroDivisionError in line 4: division by zero", for an error that passed through a loaded file;
-    None for another."""
+    """ "mine.py fails: ZeroDivisionError in line 4: division by zero", for an error raised in or through a loaded file;
+    None for any other."""
     passed = {frame.filename for frame in traceback.extract_tb(error.__traceback__)}
     path = next((file.path for file in _LOADED.values() if str(file.path) in passed), None)
     return None if path is None else f"{path.name} fails: {_fault(path, error)}"
@@ -183,14 +183,15 @@ def own_laws() -> Mapping[str, StiffnessLaw]:
 
 
 def law_names() -> tuple[str, ...]:
-    """All that a recipe may name: those of the project and of the user's files."""
+    """Names of all laws for recipes: those of the project and of the user's files."""
     return (*laws_by_name(), *SMOOTHED, *MEMBRANE_LAWS, *_LAWS)
 
 
 def own_law(law: StiffnessLaw) -> str:
-    """Registers a law for recipes; its name: `BodyRecipe(law=own_law(StiffnessLaw(bars)))`.
+    """Registers a law for recipes and returns its name: `BodyRecipe(law=own_law(StiffnessLaw(bars)))`.
 
-    Raises StudyError for what is no law, for a name that another law has, and for a law that is written in no file.
+    Raises StudyError for an object that is no law, for a name that another law has, and for a law that is not defined
+    in a file.
     """
     if not isinstance(law, StiffnessLaw):
         raise StudyError(f"a law is {law!r}; give a StiffnessLaw, as StiffnessLaw(function)")
@@ -220,7 +221,7 @@ def _is_method(value: object) -> TypeGuard[type[Method]]:
 
 
 def _check_free(noun: str, name: str, project: Iterable[str], file: UserCode, before: UserCode | None) -> None:
-    """Raises StudyError for a name that the project or another file has."""
+    """Raises StudyError for a name that the project or another file uses."""
     if name in project:
         raise StudyError(f"{noun} '{name}' is one of the project's own; give yours another name")
     if before is not None and before.path != file.path:

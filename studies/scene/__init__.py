@@ -1,1 +1,1 @@
-"""What a scene is made of: organ, tissue, loads, clock, quantities."""
+"""Scenes and their parts: organ, tissue, loads, clock, quantities."""

@@ -11,7 +11,7 @@ from studies.base.errors import StudyError
 from studies.scene.scene import Scene
 
 LATER = ("contact", "until", "along", "opens_lumen")
-"""What cuts have had since there were stored scenes with cuts; none of it is in the keys of those."""
+"""Fields of cuts that were added after the first stored scenes with cuts, whose keys lack them."""
 
 
 def scene_to_json(scene: Scene) -> str:
@@ -20,8 +20,8 @@ def scene_to_json(scene: Scene) -> str:
 
 
 def scene_to_dict(scene: Scene) -> dict[str, Any]:
-    """JSON-able form; without cuts where there are none, as before scenes could have any, nor what a cut leaves out of
-    LATER."""
+    """JSON-able form; without `cuts` if there are none, as before scenes could have cuts, and without fields of LATER
+    that have their default."""
     data = _scene_adapter().dump_python(scene, mode="json")
     data["cuts"] = [{k: v for k, v in cut.items() if v or k not in LATER} for cut in data["cuts"]]
     return data if scene.cuts else {name: value for name, value in data.items() if name != "cuts"}
@@ -33,7 +33,7 @@ def scene_from_dict(data: Mapping[str, Any]) -> Scene:
 
 
 def scene_of_key(key: str) -> Scene:
-    """The scene of a stored case, whose method or law may be in a file that is not at hand. Raises StudyError."""
+    """The scene in the key of a stored case, even if its method or law is in a missing file. Raises StudyError."""
     try:
         return scene_from_dict(json.loads(key)["scene"])
     except (ValueError, KeyError, TypeError, ValidationError) as error:

@@ -1,4 +1,5 @@
-"""Checks of a scene and its organ's surface before there is a mesh: obstacles inside, regions off it, units."""
+"""Checks of a scene and its organ's surface before meshing: obstacles inside the organ, regions off its surface,
+units."""
 
 import json
 import warnings
@@ -24,14 +25,14 @@ from studies.scene.scene import Organ, Scene
 Surface = tuple[np.ndarray, np.ndarray]
 """Points (n, 3) [m] and outward triangles (t, 3)."""
 START_DEPTH = 1e-3
-"""Of the body's size: how deep an obstacle may start in the true surface, as in the reference (reference_fem.system).
-What a mesh adds to that, the run checks."""
+"""Depth, over the size of the body, to which an obstacle may start inside the true surface, as in reference_fem.system.
+The run checks the depth in the mesh."""
 MODULUS, DENSITY, DURATION = (100.0, 1e5), (500.0, 2000.0), (1e-3, 1e3)
 """Usual shear moduli [Pa], densities [kg/m³] and durations [s]: from fat to cartilage, from lung to bone."""
 UNUSUAL = 100.0
-"""A number this many times outside its range cannot be meant."""
+"""Factor outside its usual range beyond which a number is an error."""
 LARGE = 10.0
-"""Times the body's size: a longer length cannot be meant."""
+"""Factor on the size of the body beyond which a length is an error."""
 AXIS_POINTS = 9
 SIDES = ((0, 1), (1, 2), (2, 0), (0, 1, 2))
 """Corners of a triangle between which a surface is sampled once more."""
@@ -40,9 +41,8 @@ PATH_TIMES = 41
 
 
 def check_scene(scene: Scene) -> list[str]:
-    """Warnings of numbers that are hardly meant, a sentence each. Raises StudyError for a scene that cannot start, and
-    for numbers that cannot be meant. Meshes nothing; takes a second or two where something touches or holds the body.
-    """
+    """Warnings of unusual numbers, a sentence each. Raises StudyError for a scene that cannot start, and for impossible
+    numbers. Makes no mesh; takes a second or two if an obstacle or a held region is to be checked."""
     check_clock(scene)
     _check_names(scene)
     remarks = [
@@ -78,8 +78,8 @@ def check_scene(scene: Scene) -> list[str]:
 
 
 def surface_of(organ: Organ, name: str) -> Surface:
-    """The true surface of an organ, finely sampled; name: of the scene. Raises StudyError for an organ that there is
-    not, and a file that cannot be read."""
+    """The true surface of an organ, finely sampled; name: of the scene. Raises StudyError for an unknown organ, and for
+    a file that cannot be read."""
     if organ.shape == "file":
         return _scan_surface(json.dumps(dict(organ.parameters), sort_keys=True), name)
     return _shape_surface(organ.shape, json.dumps(dict(organ.parameters), sort_keys=True))
@@ -94,14 +94,14 @@ def _shape_surface(shape: str, parameters: str) -> Surface:
 def _scan_surface(parameters: str, name: str) -> Surface:
     source, how = scanned(Organ("file", json.loads(parameters)), name)
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # the mesh warns of every change to the surface
+        warnings.simplefilter("ignore")  # meshing warns of every change to the surface
         surface, _ = repaired_surface(source, opened(source), Remeshing(**how))
     return surface.points, surface.triangles
 
 
 def depth_at_start(obstacle: Obstacle, points: np.ndarray, triangles: np.ndarray, hollow: bool = False) -> float:
-    """How deep an obstacle starts inside a closed surface [m], negative where it is outside; one in the lumen of a
-    `hollow` organ is outside its wall."""
+    """How deep an obstacle starts inside a closed surface [m], negative if it is outside; an obstacle in the lumen of a
+    `hollow` organ is outside."""
     depth = -float(obstacle.gap(points, 0.0).min())
     if isinstance(obstacle, Plane) or hollow:
         return depth
@@ -115,7 +115,7 @@ def depth_at_start(obstacle: Obstacle, points: np.ndarray, triangles: np.ndarray
 
 
 def _check_organ(scene: Scene) -> None:
-    """Raises StudyError for an organ that there is not, and parameters that it cannot have."""
+    """Raises StudyError for an unknown organ, and for invalid parameters."""
     try:
         if lookup(scene.organ.shape, [*SHAPES, "file"], "organ") != "file":
             make_shape(scene.organ.shape, scene.organ.parameters)
@@ -158,7 +158,7 @@ def _check_region(scene: Scene, name: str, level: np.ndarray, points: np.ndarray
 
 
 def _pressed_through(scene: Scene, number: int, points: np.ndarray) -> list[str]:
-    """A plane that ends behind a body that cannot get out of its way."""
+    """A warning for a plane that moves all the way through a body that cannot move out of its way."""
     plane = scene.obstacles[number]
     if not isinstance(plane, Plane) or not (scene.held or len(scene.obstacles) > 1):
         return []
@@ -189,7 +189,7 @@ def _pressed_into_held(scene: Scene, number: int, samples: np.ndarray, size: flo
 
 
 def _unusual(scene: Scene, what: str, value: float, usual: tuple[float, float], unit: str) -> list[str]:
-    """A warning for a number outside its usual range. Raises StudyError for one that cannot be meant."""
+    """A warning for a number outside its usual range. Raises StudyError for an impossible one."""
     low, high = usual
     sentence = (
         f"scene '{scene.name}': the {what} is {value!r} {unit}, "
@@ -201,7 +201,7 @@ def _unusual(scene: Scene, what: str, value: float, usual: tuple[float, float], 
 
 
 def _too_large(scene: Scene, what: str, length: float, size: float) -> list[str]:
-    """A warning for a length above the body's size. Raises StudyError for one that cannot be meant."""
+    """A warning for a length above the size of the body. Raises StudyError for an impossible one."""
     if length <= size:
         return []
     sentence = f"scene '{scene.name}': {what} is {length:.3g} m long, the body {size:.3g} m: are all lengths in metres?"
@@ -219,5 +219,5 @@ def _width(obstacle: Obstacle) -> float:
 
 
 def _reach(path: Trajectory) -> float:
-    """How far a path leads from its start [m]."""
+    """Largest distance of a path from its start [m]."""
     return float(np.linalg.norm(np.subtract(path.displacements, path.displacements[0]), axis=1).max())

@@ -1,4 +1,4 @@
-"""Places on a body that a person chooses for hold and probe: sides, and points of its surface."""
+"""User-chosen places on a body for hold and probe: sides, or points of its surface."""
 
 import re
 
@@ -12,11 +12,11 @@ from studies.geometry.surface.distance import distance_to_surface
 from studies.scene.placing import Vector, along
 
 PATCH = 0.12
-"""Of the length: radius of the patch whose flatness counts."""
+"""Radius of the patch whose flatness is measured, over the length of the body."""
 NEAR = 0.1
-"""Of the length: how far a point that a person gives may be from the surface."""
+"""Largest distance of a given point from the surface, over the length of the body."""
 RADIUS, DEPTH, GAP = 0.10, 0.05, 0.0005
-"""Of the probe: its radius and how far it goes in, of the longest side; its distance at the start [m]."""
+"""Radius of the probe and depth of its press, over the longest side of the body; its distance at the start [m]."""
 SIDES: dict[str, Vector] = {
     "left": (-1.0, 0.0, 0.0),
     "right": (1.0, 0.0, 0.0),
@@ -46,7 +46,8 @@ def place_of(text: str) -> Place:
 
 
 def snapped(surface: tuple[np.ndarray, np.ndarray], point: Vector, length: float, name: str) -> np.ndarray:
-    """The nearest place (3,) of a surface: a node, the middle of an edge or of a triangle. name: what asks.
+    """The nearest place (3,) of a surface: a node, the middle of an edge or of a triangle. name: of the option, for the
+    message.
 
     Raises StudyError for a point that is not near the surface."""
     places, _ = samples(*surface)
@@ -69,7 +70,7 @@ def palpated_at(
     point: Vector,
 ) -> tuple[Vector, Vector, float]:
     """The place of the surface that is nearest to a point, the direction out of the body there, and the patch's
-    flatness. Raises StudyError where the body is held, or stands in the probe's way."""
+    flatness. Raises StudyError if the body is held there, or is in the way of the probe."""
     place, radius = snapped(surface, point, length, name), RADIUS * length
     if float(hold.level(place[None])[0]) < radius:
         raise StudyError(
@@ -85,7 +86,7 @@ def palpated_at(
 
 
 def comes_in(surface: tuple[np.ndarray, np.ndarray], place: np.ndarray, direction: np.ndarray, length: float) -> bool:
-    """Whether the probe comes straight in along `direction` from outside the body to where it starts."""
+    """Whether the probe can move straight along `direction` from outside the body to its start."""
     radius, outward = RADIUS * length, vector(direction / np.linalg.norm(direction))
     ways = np.arange(radius + GAP, 2.0 * length, 0.5 * radius)
     centres = np.array([along(vector(place), outward, float(way)) for way in ways])

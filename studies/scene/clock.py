@@ -1,4 +1,4 @@
-"""What the times of a scene may be."""
+"""Checks of the times of a scene, and the frames of the events of a cut."""
 
 import math
 
@@ -9,11 +9,11 @@ from studies.scene.cut import Cut
 from studies.scene.scene import Scene
 
 MOST_EVENTS = 20
-"""Of a cut that advances: more cost memory and time before the run, and the end is the same."""
+"""Most events of an advancing cut: more take memory and time before the run and do not change the final state."""
 
 
 def check_clock(scene: Scene, file: str = "") -> None:
-    """Raises StudyError for a duration, a number of frames or checkpoints that no run could have; file: first words of
+    """Raises StudyError for an impossible duration, number of frames or checkpoints; file: first words of
     the sentence."""
     if not is_number(scene.duration) or not scene.duration > 0:
         raise StudyError(
@@ -32,7 +32,8 @@ def check_clock(scene: Scene, file: str = "") -> None:
 
 
 def event_frames(scene: Scene, cut: Cut, frames: int) -> list[int]:
-    """Frames before each event of the cut: one, or of a cut that advances up to MOST_EVENTS that are evenly spread.
+    """Number of frames before each event of the cut: one event, or for an advancing cut up to MOST_EVENTS evenly spaced
+    ones.
 
     Raises StudyError for a cut that begins before the first frame ends, or ends after the last begins or in the frame
     in which it begins, and for a checkpoint after it in its last frame."""
@@ -59,7 +60,7 @@ def event_frames(scene: Scene, cut: Cut, frames: int) -> list[int]:
 
 
 def check_judged_after_cut(scene: Scene) -> None:
-    """Raises StudyError where all checkpoints of a reference come before a cut of its scene, or one while it
+    """Raises StudyError for a scene with a reference if a cut has no checkpoint after it, or a checkpoint while it
     advances."""
     if scene.reference is None:
         return

@@ -1,4 +1,4 @@
-"""Where and when an organ is cut: a sheet in its rest configuration, the same material for every solver."""
+"""Cuts of an organ: their time, and a sheet in the rest configuration, the same for every solver."""
 
 import math
 from collections.abc import Sequence
@@ -16,26 +16,27 @@ STEEPEST = 1e-6
 
 @dataclass(frozen=True)
 class Cut:
-    """A part of a plane that opens between two frames, or over a stretch of time."""
+    """A part of a plane that opens between two frames, or over a time interval."""
 
     name: str
     plane: HalfSpace
-    """Its level = 0, at rest; the front of the cut is where the level is positive."""
+    """The plane level = 0, at rest; the level is positive in front of the cut."""
     within: HalfSpace | BallRegion | None = None
     """The blade: a half space cuts up to a straight front, a ball opens a disc inside the body; None: the whole
     section."""
     at: float = 0.0
-    """When [s]; of a cut that advances, when it begins."""
+    """Time of the cut, or the start of a cut that advances [s]."""
     until: float | None = None
-    """When a cut that advances ends [s]; None: all of it opens at once."""
+    """End of a cut that advances [s]; None: all of it opens at once."""
     along: Vector | None = None
-    """Direction in which it advances, at an even speed; of any length."""
+    """Direction in which it advances, at constant speed; a vector of any length."""
     contact: bool = False
     """Whether its faces touch, without friction, where they close; else they pass through each other."""
     opens_lumen: bool = False
-    """Of a hollow organ, whose wall it cuts through: what fills its lumen goes, and nothing keeps its volume then."""
+    """Whether it cuts through the wall of a hollow organ: the content of the lumen then drains, and its volume is no
+    longer kept."""
     free: bool = False
-    """Whether a piece that nothing holds may go where it will."""
+    """Whether a piece without held nodes is allowed."""
 
     def __post_init__(self) -> None:
         if not 0.0 < self.at < float("inf"):
@@ -63,17 +64,17 @@ class Cut:
 
     @property
     def unit_normal(self) -> np.ndarray:
-        """Of its plane, from behind it to its front, (3,)."""
+        """Unit normal of its plane, towards its front, (3,)."""
         return np.asarray(self.plane.normal, float) / np.linalg.norm(self.plane.normal)
 
     @property
     def ends(self) -> float:
-        """When all of it is open [s]."""
+        """Time from which it is fully open [s]."""
         return self.at if self.until is None else self.until
 
     @property
     def at_once(self) -> "Cut":
-        """The same sheet opened at one instant: where it comes to rest does not depend on how the cut advances."""
+        """The same sheet opened at one instant: the final equilibrium does not depend on how the cut advances."""
         return replace(self, until=None, along=None)
 
 

@@ -1,4 +1,4 @@
-"""Checks of a scene's cut before there is a mesh: when it is made, of what, and what holds the pieces."""
+"""Checks of a scene's cuts before meshing: their times, the kind of organ, and whether all pieces are held."""
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from studies.scene.scene import Scene
 
 
 def check_cuttable(scene: Scene, cut: Cut) -> None:
-    """Raises StudyError for a time at which nothing can be cut, and for what cannot be cut."""
+    """Raises StudyError for an invalid time of a cut, and for a scene that cannot be cut."""
     event_frames(scene, cut, scene.frames)
     check_judged_after_cut(scene)
     if scene.organ.shape == "file":
@@ -32,7 +32,7 @@ def check_cuttable(scene: Scene, cut: Cut) -> None:
 
 
 def _check_wall(scene: Scene, cut: Cut) -> None:
-    """Raises StudyError for a cut through the wall of a hollow organ that no run or reference can have."""
+    """Raises StudyError for a cut through the wall of a hollow organ that neither run nor reference supports."""
     name = f"scene '{scene.name}': cut '{cut.name}'"
     if len(scene.cuts) > 1:
         raise StudyError(f"scene '{scene.name}' cuts the wall of a hollow organ {len(scene.cuts)} times; cut it once")
@@ -46,7 +46,7 @@ def _check_wall(scene: Scene, cut: Cut) -> None:
 
 def check_cuts(scene: Scene, surface: tuple[np.ndarray, np.ndarray]) -> None:
     """Raises StudyError for cuts through the true `surface` of the organ, points (n, 3) [m] and triangles (t, 3), that
-    no mesh can have, and for a piece that nothing holds."""
+    cannot be meshed, and for a piece without a held region."""
     sheets = {cut.name: (cut.plane, _sheet(scene, cut, surface)) for cut in scene.cuts}
     check_apart(f"scene '{scene.name}'", sheets)
 

@@ -1,4 +1,4 @@
-"""Whether a scene is so slow that what its body weighs where makes no difference to how it moves."""
+"""Whether a scene is so slow that the distribution of mass in its body does not matter."""
 
 import numpy as np
 
@@ -6,12 +6,14 @@ from massspring import Probe, Trajectory
 from studies.scene.scene import Scene
 
 SLOW = 0.01
-"""Of the speed of a shear wave: inertia then adds some 1e-4 to the forces, as its square."""
+"""Speed of loads over that of a shear wave below which they are slow: inertia, which varies as its square, then adds
+about 1e-4 to the forces."""
 
 
 def why_inertia_matters(scene: Scene) -> str | None:
-    """Why masses that are not the tissue's would change the answer of the scene; None where loads are so slow that the
-    body passes from rest to rest. Weight is no reason where the body is held: it has masses of its own."""
+    """Why masses other than those of the tissue would change the results of the scene; None if loads are so slow that
+    the body passes through equilibria. Gravity on a held body is no reason, since it always acts on the masses of the
+    tissue."""
     if scene.start is not None:
         return "it starts in motion or out of shape, and rings"
     if scene.reference is not None and scene.reference.dt is not None:

@@ -1,4 +1,4 @@
-"""What kind of scene it is, read off what it holds: a solid or hollow organ, and how it is loaded."""
+"""The kind of a scene, derived from its contents: a solid or hollow organ, and its kind of load."""
 
 from dataclasses import dataclass
 
@@ -12,12 +12,12 @@ NOT_ADAPTIVE = {
     "thin probe": "the reference elements do not know a thin probe",
     "rest": "nothing loads it",
 }
-"""Loads of a scene -> why no solution by reference elements says where its body needs small elements."""
+"""Kind of load -> why adaptive bodies, which need a solution with reference elements, are not possible."""
 
 
 @dataclass(frozen=True)
 class Kind:
-    """Scenes of one kind ask the same of a body."""
+    """Scenes of one kind make the same demands on a body."""
 
     hollow: bool
     load: str
@@ -30,12 +30,12 @@ class Kind:
 
 
 def kind_of(scene: Scene) -> Kind:
-    """The kind of a scene. Raises StudyError for an organ that there is not."""
+    """The kind of a scene. Raises StudyError for an unknown organ."""
     return Kind(has_wall(scene), load_of(scene))
 
 
 def has_wall(scene: Scene) -> bool:
-    """Whether the organ of a scene is hollow; of a mesh file, whether it is given a wall or a lumen."""
+    """Whether the organ of a scene is hollow; for a mesh file, whether it has a wall or a lumen."""
     organ = scene.organ
     if scene.lumen is not None:
         return True
@@ -45,7 +45,7 @@ def has_wall(scene: Scene) -> bool:
 
 
 def load_of(scene: Scene) -> str:
-    """How the organ is loaded; where several loads act, the one that bends it most locally."""
+    """The kind of load; if there are several loads, the most local one."""
     if scene.start is not None or (scene.reference is not None and scene.reference.dt is not None):
         return "motion"
     if any(isinstance(obstacle, Probe) for obstacle in scene.obstacles):

@@ -1,4 +1,4 @@
-"""An organ that comes from a mesh file or a scan: its parameters, and what is asked of its surface."""
+"""An organ from a mesh file or a scan: its parameters, and the options for its surface."""
 
 from typing import Any
 
@@ -8,16 +8,16 @@ from studies.geometry.files.units import Source
 from studies.scene.scene import Organ
 
 SOURCE_PARAMETERS = ("path", "unit", "scale", "longest_side", "part")
-"""How a file is to be taken."""
+"""Parameters for reading a file."""
 MADE = ("smooth", "wall", "holes", "solid")
-"""What is done to a surface on its way to a body, as in studies.geometry.api.scans.Remeshing."""
+"""Operations on the surface before meshing, as in studies.geometry.api.scans.Remeshing."""
 FILE_PARAMETERS = (*SOURCE_PARAMETERS, "sha256", "remesh", *MADE)
-"""Of the organ "file"."""
+"""All parameters of the organ "file"."""
 
 
 def scanned(organ: Organ, name: str) -> tuple[Source, dict[str, Any]]:
-    """The file of an organ, and what is asked of its new surface; name: of the scene. Raises StudyError, also for a
-    file that holds something else than when the scene was made."""
+    """The file of an organ, and the options for its new surface; name: of the scene. Raises StudyError, also for a file
+    that has changed since the scene was made."""
     parameters = organ.parameters
     for key in parameters:
         lookup(key, FILE_PARAMETERS, "parameter of an organ from a file")
@@ -32,6 +32,6 @@ def scanned(organ: Organ, name: str) -> tuple[Source, dict[str, Any]]:
 
 
 def remeshed(organ: Organ) -> bool:
-    """Whether the number of surface nodes is free: a mesh file that comes as it is has its own."""
+    """Whether the number of surface nodes can be chosen; a mesh file that is used unchanged has a fixed number."""
     parameters = organ.parameters
     return organ.shape != "file" or bool("smooth" in parameters or "wall" in parameters or parameters.get("remesh"))

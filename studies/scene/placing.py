@@ -9,13 +9,14 @@ Vector = tuple[float, float, float]
 
 
 def press_times(start: float, end: float, steps: int, rest: float) -> tuple[float, ...]:
-    """`steps` evenly spaced times up to the end of a press [s], the last moved to `rest`, when all is still."""
+    """`steps` evenly spaced times up to the end of a press [s], the last replaced by `rest`, when the body is at
+    rest."""
     times = np.linspace(start, end, steps + 1)[1:]
     return (*times[:-1].tolist(), rest)
 
 
 def probe_of(shape: Shape) -> PalpationPoint:
-    """Where the shape is palpated. Raises StudyError for a shape that does not say."""
+    """The palpation point of the shape. Raises StudyError for a shape without one."""
     if shape.probe is None:
         raise StudyError(f"the shape '{shape.name}' names no probe point; give it one, or choose another organ")
     return shape.probe

@@ -1,4 +1,4 @@
-"""Where a body is held and palpated: proposed by rule from its shape, or where a person says."""
+"""Proposes where a body is held and palpated, by rules from its shape or from the user's choice."""
 
 from dataclasses import dataclass
 
@@ -15,15 +15,15 @@ from studies.scene.placing import Vector
 HELD = 0.10
 """Share of the surface that is held."""
 END = 0.15
-"""Of the length: how far from an end its surface is measured, to tell which end is blunter."""
+"""Distance from an end, over the length, within which the surface is measured to find the blunter end."""
 FAR = 0.4
-"""Of the length: how far from the held end the palpation point is at least."""
+"""Least distance of the palpation point from the held end, over the length."""
 FREE = 0.02
-"""Of the length: how far the body may reach beyond the plane that touches it in the palpation point."""
+"""How far the body may extend beyond the tangent plane at the palpation point, over the length."""
 HALF = 0.5
-"""Of the largest distance from the hold: a palpation point need not be farther away than this, however long it is."""
+"""Distance from the hold, over the largest one, that is always sufficient for a palpation point."""
 FACING = 0.5
-"""Cosine of the angle to a side from which a patch looks to that side."""
+"""Least cosine of the angle between the normal of a patch and a side for the patch to face that side."""
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,7 @@ class Proposal:
     """Principal axes of a body, a hold at one end, and a point to palpate."""
 
     middle: Vector
-    """Of the surface [m]."""
+    """Middle of the surface [m]."""
     axes: tuple[Vector, Vector, Vector]
     """Unit vectors, the longest extent first."""
     sides: Vector
@@ -40,7 +40,7 @@ class Proposal:
     held_where: str
     """In words, for titles: "one end", "the top"."""
     held_share: float
-    """Of the surface's area."""
+    """Share of the surface area that is held."""
     palpation: PalpationPoint
     flatness: float
     """Length of the mean unit normal round the point: 1 is a plane."""

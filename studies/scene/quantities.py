@@ -5,18 +5,18 @@ import math
 from studies.scene.scene import Scene
 
 ALWAYS = ("volume",)
-"""Quantities with a truth of their own: a volume is compared with the body's own rest volume."""
+"""Quantities that need no reference: a volume is compared with the rest volume of the body."""
 
 
 GAUGE_FREE = ("pressure", "lumen")
-"""Quantities that every scene at rest allows: a rigid turn does not change them."""
+"""Quantities that every scene ending at rest allows, since a rigid rotation does not change them."""
 
 
 def allowed(scene: Scene, quantity: str) -> bool:
-    """Whether the scene says that a quantity of its reference may be compared."""
+    """Whether a quantity of the reference may be compared in the scene."""
     word = quantity.split("_")[0]
     if word == "lumen" and not scene.filled_at(math.inf):
-        return False  # what a cut lets go has no pressure in the end
+        return False  # content that a cut has drained has no pressure at the end
     if word == "opening":
         return bool(scene.cuts)
     moves = scene.reference is not None and scene.reference.dt is not None

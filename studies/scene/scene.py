@@ -1,4 +1,4 @@
-"""A scene: what happens to which organ. Both solvers read the same one: load, contact and clock agree."""
+"""A scene: an organ and its loads. Both solvers use the same scene, so load, contact and clock agree."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -21,7 +21,7 @@ Region = HalfSpace | BallRegion | EllipsoidRegion | PaintedRegion
 
 @dataclass(frozen=True)
 class Organ:
-    """A shape the mesher knows, or a mesh file."""
+    """A shape of the mesher, or a mesh file."""
 
     shape: str
     """A name of `studies.geometry`, or "file"."""
@@ -35,7 +35,7 @@ class Organ:
     def __post_init__(self) -> None:
         if self.shape == "file" and "path" in self.parameters and "sha256" not in self.parameters:
             content = Source(Path(self.parameters["path"])).sha256
-            if content is not None:  # of a file that cannot be read the mesher says why
+            if content is not None:  # for a file that cannot be read the mesher gives the reason
                 object.__setattr__(self, "parameters", {**self.parameters, "sha256": content})
 
 
@@ -50,7 +50,7 @@ class Held:
 
 @dataclass(frozen=True)
 class Lumen:
-    """What fills a hollow organ."""
+    """The content of a hollow organ."""
 
     content: str = "closed"
     """"closed": an incompressible content, its volume prescribed; "open": drained, without pressure."""
@@ -66,7 +66,7 @@ class Lumen:
 
 @dataclass(frozen=True)
 class ForceOutput:
-    """The force a scene is about: what an obstacle, or an attachment, feels of the body."""
+    """The probed force of a scene: that of an obstacle or an attachment."""
 
     what: str
     """"obstacle" or "held"."""
@@ -80,7 +80,7 @@ class ForceOutput:
 
 
 FEWEST_UNKNOWNS = 1e3
-"""Of a plan's `most`: fewer are no finite-element reference."""
+"""Least value of a plan's `most`: with fewer unknowns a reference is too inaccurate."""
 
 
 @dataclass(frozen=True)
@@ -96,20 +96,20 @@ class ReferencePlan:
     mesh: str = "solid"
     """"solid": the scene's organ; "octant": an eighth of a ball (three symmetry planes)."""
     levels: tuple[float, ...] = ()
-    """Of an octant the element size over the radius away from the contact, coarse to fine; of a motion of a whole organ
-    its surface nodes. Three are the rule."""
+    """For an octant the element size over the radius away from the contact, coarse to fine; for a motion of a whole
+    organ its surface nodes. Three levels are usual."""
     variants: tuple[str, ...] = ("steps", "contact", "kappa")
-    """Settings that are made better on the coarsest mesh, for their share of the error bar."""
+    """Settings that are refined on the coarsest mesh, for their share of the error bar."""
     base: int = 270
     """Surface nodes of the coarsest of nested meshes; fewer than 250 miss thin parts of an organ."""
     at_contact: int = 2
-    """Times that its elements are halved at the surface that an obstacle will reach."""
+    """How often its elements are halved at the surface that an obstacle will reach."""
     tolerance: float = 0.005
     """Relative bar of the force at which nested meshes are fine enough."""
     most: float = 60e3
     """Unknowns of the finest of nested meshes."""
     dt: float | None = None
-    """Largest time step of a motion [s]; None: a load path without inertia, as slow as it takes."""
+    """Largest time step of a motion [s]; None: a load path without inertia."""
 
     def __post_init__(self) -> None:
         if self.mesh not in ("solid", "octant"):
@@ -154,19 +154,21 @@ class Scene:
     """[s]."""
     frames: int
     checkpoints: tuple[float, ...]
-    """Times at which the reference is known [s], ascending; the last one is the scene at its deepest, come to rest."""
+    """Times at which the reference is computed [s], ascending; at the last one the load is largest and the body at
+    rest."""
     probed: ForceOutput
     reference: ReferencePlan | None
     obstacles: tuple[Obstacle, ...] = ()
     held: tuple[Held, ...] = ()
     lumen: Lumen | None = None
-    """Of a hollow organ; None for a solid one."""
+    """Content of a hollow organ; None for a solid one."""
     gravity: Vector = (0.0, 0.0, 0.0)
     """[m/s²]."""
     damping: float = 0.0
     """Mass-proportional [1/s]; both models have the same."""
     quantities: tuple[str, ...] = ("force", "surface", "interior", "silhouette", "volume")
-    """What may be compared; a scene that leaves a rigid turn free drops "surface" and "interior" (gauge freedom)."""
+    """Quantities that may be compared; a scene that allows a rigid rotation omits "surface" and "interior" (gauge
+    freedom)."""
     start: InitialConditions | None = None
     """None: at rest."""
     cuts: tuple[Cut, ...] = ()
@@ -200,7 +202,7 @@ class Scene:
 
     @property
     def regions(self) -> dict[str, Region]:
-        """Attachment regions by name, as the mesher wants them."""
+        """Attachment regions by name, for the mesher."""
         return {held.name: held.region for held in self.held}
 
     @property
@@ -209,7 +211,7 @@ class Scene:
         return self.lumen is not None and self.lumen.content == "closed"
 
     def filled_at(self, t: float) -> bool:
-        """Whether it still does at time t [s]: no cut has opened the lumen before."""
+        """Whether the lumen is filled and no cut has opened it before time t [s]."""
         return self.filled and not any(cut.opens_lumen and cut.at < t for cut in self.cuts)
 
     @property

@@ -1,4 +1,4 @@
-"""A scene file for an organ of one's own, written for a person to read and change."""
+"""Writes a scene file for a user's organ that the user can read and change."""
 
 import json
 from collections.abc import Mapping
@@ -78,7 +78,7 @@ class Recommended:
     dt_fraction: float
     """Time step over the stability limit."""
     alike: tuple[str, ...]
-    """Scenes where it was measured."""
+    """Scenes in which it was measured."""
 
 
 def scene_text(
@@ -92,7 +92,7 @@ def scene_text(
     """A Python file, in `folder`, that defines SCENE and STUDY for the organ in a file.
 
     organ: parameters of Organ("file"), see organ_options; tissue: a name of TISSUES; nodes: of the body of one volume;
-    recommended: a second body, None where no other is known to be better."""
+    recommended: a second body, None if none is known to be better."""
     path = Path(str(organ["path"]))
     given = {key: json.dumps(value) if isinstance(value, str) else repr(value) for key, value in organ.items()}
     entries = ", ".join(f'"{key}": {text}' for key, text in (given | {"path": "str(FILE)"}).items())
@@ -124,7 +124,7 @@ def scene_text(
 
 
 def organ_options(source: Source, how: Mapping[str, object]) -> dict[str, object]:
-    """The parameters of Organ("file") that give the same body; how: what was asked of the mesher, by the names of
+    """The parameters of Organ("file") that give the same body; how: options for the mesher, by the names of
     studies.geometry.api.scans.Remeshing."""
     given = {"path": str(source.path), "unit": source.unit, "scale": None if source.scale == 1.0 else source.scale}
     given |= {"longest_side": source.longest_side, "part": source.part, "remesh": True}
@@ -132,7 +132,7 @@ def organ_options(source: Source, how: Mapping[str, object]) -> dict[str, object
 
 
 def relative(path: Path, folder: Path) -> str:
-    """The path as seen from the folder, where there is a way without going up; else the whole path."""
+    """The path relative to the folder if it lies below it; else the whole path."""
     path, folder = path.resolve(), folder.resolve()
     return path.relative_to(folder).as_posix() if path.is_relative_to(folder) else path.as_posix()
 

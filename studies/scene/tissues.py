@@ -8,7 +8,7 @@ from studies.base.errors import StudyError
 
 @dataclass(frozen=True)
 class Tissue:
-    """Nearly incompressible soft tissue; the mass-spring body matches mu, its volume constraint stands for kappa."""
+    """Nearly incompressible soft tissue; the mass-spring body matches mu, and its volume constraint replaces kappa."""
 
     shear_modulus: float
     """mu [Pa]."""
@@ -41,9 +41,9 @@ TISSUES = {"bladder": BLADDER, "kidney": KIDNEY, "liver": LIVER, "spleen": SPLEE
 
 
 def tissue_named(text: str) -> str:
-    """The one of TISSUES that is a word of a text, such as a file's name: "spleen" of "VH_F_Spleen.stl".
+    """The tissue of TISSUES whose name is a word of a text, such as a file name: "spleen" of "VH_F_Spleen.stl".
 
-    Raises StudyError where none is, or several are.
+    Raises StudyError for none or several.
     """
     words = {word.lower() for word in re.findall(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+", text)}
     names = [name for name in TISSUES if name in words]

@@ -1,1 +1,1 @@
-"""What a frame loop is given."""
+"""Arguments of the compiled frame loops, as named tuples of arrays."""

@@ -1,4 +1,4 @@
-"""What a compiled frame loop is given: plain tuples of arrays, so that a frame costs one call from Python."""
+"""Arguments of the compiled frame loops: named tuples of arrays, so that a frame takes one call from Python."""
 
 from typing import NamedTuple
 
@@ -24,7 +24,7 @@ class Model(NamedTuple):
     triangles: np.ndarray
     """Closed surface of the one volume that is kept, outward, (f, 3) uint32; of the whole where there are several."""
     mass: np.ndarray
-    """[kg], (n,)."""
+    """Inertial mass [kg], (n,)."""
     inverse_mass: np.ndarray
     """[1/kg], (n,); 0 marks a node whose motion is prescribed."""
     largest_inverse_mass: float
@@ -39,36 +39,37 @@ class Model(NamedTuple):
     held_rest: np.ndarray
     """Rest positions of the held nodes [m], (h, 3)."""
     rest_lam: np.ndarray
-    """What each kept volume takes of the pressure that holds springs without length apart at rest [Pa], (m,)."""
+    """Multiplier of each kept volume at rest [Pa], (m,): together they balance springs without length."""
     correction_limit: float
-    """How far a step may move a node to make up for a wrong volume [m]; what is left is made up later."""
+    """Largest distance by which the correction of a volume error may move a node in a step [m]; later steps correct the
+    rest."""
     slices: Slices
 
 
 @by_address
 class Nodes(NamedTuple):
-    """Where the n nodes are and what moves them; changes at every step."""
+    """Positions, velocities and forces of the n nodes; they change in every step."""
 
     x: np.ndarray
     """Positions [m], (n, 3)."""
     v: np.ndarray
     """Velocities [m/s], (n, 3)."""
     v_star: np.ndarray
-    """Velocities after all known forces [m/s], (n, 3)."""
+    """Velocities predicted from all explicit forces, before multipliers and contact [m/s], (n, 3)."""
     force: np.ndarray
-    """Spring forces [N], (n, 3)."""
+    """Forces on held nodes [N], (n, 3); rows of free nodes are not kept up to date."""
     gradient: np.ndarray
     """G = dV/dx of the one volume that is kept [m²], (n, 3); 0 where none is, or several."""
 
 
 @by_address
 class Contacts(NamedTuple):
-    """Which nodes obstacles touch in this step, and what that takes from their motion."""
+    """Nodes that obstacles touch in this step, and the directions of motion that contact removes."""
 
     contact_id: np.ndarray
     """0 for a free node, else 1 + the obstacle it lies on, (n,) uint32."""
     second: np.ndarray
-    """1 + the other obstacle of a node in an edge between two, (n,) uint32."""
+    """1 + the second obstacle of a node that lies on the edge between two, (n,) uint32."""
     mode: np.ndarray
     """Directions that obstacles take from a node (kernels.contact.modes), (n,) uint8."""
     normal: np.ndarray
@@ -78,7 +79,7 @@ class Contacts(NamedTuple):
     direction: np.ndarray
     """The normal of a node that slides, the edge of one between two obstacles, (n, 3)."""
     v_target: np.ndarray
-    """Velocity that ends the step on the obstacles, in the directions taken, less what friction takes [m/s], (n, 3)."""
+    """Velocity in the removed directions that ends the step on the obstacles, reduced by friction [m/s], (n, 3)."""
     active: np.ndarray
     """The touched nodes, in the order in which they were found, (n,) uint32; released ones among them."""
     active_count: np.ndarray
@@ -96,19 +97,20 @@ class Workspace(NamedTuple):
     padded_positions: np.ndarray
     """Positions [m] and a zero, (n, 4)."""
     tile: np.ndarray
-    """Of `kernels.fused`, one row a thread."""
+    """Scratch of `kernels.fused`, one row per thread."""
     pulled: np.ndarray
     """Forces and 6 G of the slices of pieces, (pieces, 384)."""
     sums: np.ndarray
-    """Shares of the slices in 18 V, G·v* and G·W·G, (S + 1, 3) float64; last those of nodes in pieces."""
+    """Contributions of the slices to 18 V, G·v* and G·W·G, (S + 1, 3) float64; the last row is that of nodes in
+    pieces."""
 
 
 class Push(NamedTuple):
     """The force that keeps volumes on every node, f_i = factor · direction_i [N].
 
-    One volume: lam G_i; several: (Jᵀ lam)_i, summed before, with a factor of 1. Kernels see the product alone. It stays
-    one because G is known a step's work before lam: a field of forces would be one more pass over all nodes whenever
-    lam changes, and dt w (lam G) is rounded otherwise than (dt lam w) G.
+    One volume: lam G_i; several: (Jᵀ lam)_i, summed before, with a factor of 1. Kernels use only the product. The two
+    factors stay separate because G is computed before lam: an array of forces would need one more pass over all nodes
+    whenever lam changes, and dt w (lam G) rounds differently from (dt lam w) G.
     """
 
     direction: np.ndarray
@@ -129,7 +131,7 @@ class Tips(NamedTuple):
 
 @by_address
 class BoundaryConditions(NamedTuple):
-    """One frame's outside world, q steps, o obstacles, g attachments."""
+    """Loads, obstacles and targets during one frame of q steps; o obstacles, g attachments."""
 
     dt: float
     """[s]."""
@@ -138,7 +140,7 @@ class BoundaryConditions(NamedTuple):
     gravity: np.ndarray
     """[m/s²], (3,)."""
     is_plane: np.ndarray
-    """(o,) bool; what is no plane is a capsule, a sphere where it has no length."""
+    """(o,) bool; the others are capsules; a capsule of length 0 is a sphere."""
     plane_normal: np.ndarray
     """Unit normals, towards the body, (o, 3)."""
     radius: np.ndarray
@@ -156,13 +158,13 @@ class BoundaryConditions(NamedTuple):
     held_displacement: np.ndarray
     """Of the attachments at the end of each step [m], (q, g, 3)."""
     volume_target: np.ndarray
-    """What each kept volume should be at the end of each step [m³], (q, m)."""
+    """Target of each kept volume at the end of each step [m³], (q, m)."""
     tips: Tips
     """Of thin probes, which are not among the obstacles above."""
 
 
 class Accuracy(NamedTuple):
-    """When an iteration for the multipliers ends."""
+    """Stopping criterion of the iteration for the multipliers."""
 
     tolerance: float
     """Volume error left by the linear solve, over the volume [1]."""
@@ -171,16 +173,16 @@ class Accuracy(NamedTuple):
 
 @by_address
 class FrameDiagnostics(NamedTuple):
-    """What a frame measures of itself; the loop adds, the caller starts it at zero."""
+    """Counts and sums of one frame. The loop adds to them; the caller sets them to zero before."""
 
     contact_impulse: np.ndarray
     """Impulse of each obstacle on the body [N s], those of thin probes last, (o + p, 3)."""
     held_impulse: np.ndarray
     """Impulse of each attachment on the body [N s], (g, 3)."""
     singular: np.ndarray
-    """Steps in which a wrong volume had no gradient to push on, so that no pressure could act, (1,) int64."""
+    """Steps in which a volume with an error had no gradient, so that no pressure could act, (1,) int64."""
     limited: np.ndarray
-    """Steps that made up for a part only of a wrong volume, (1,) int64."""
+    """Steps that corrected only part of a volume error, (1,) int64."""
     iterations: np.ndarray
     """Iterations for the multipliers: their sum, and the most in one step, (2,) int64; 0 where they are direct."""
     stage_times: StageTimes

@@ -1,4 +1,4 @@
-"""What compiled loops are given of springs: triangle springs, and the others side by side in slices."""
+"""Springs as arguments of compiled loops: triangle springs, and the other springs in slices of 64 nodes."""
 
 from typing import NamedTuple
 
@@ -23,7 +23,7 @@ class Membrane(NamedTuple):
 
 @by_address
 class Slices(NamedTuple):
-    """Who pulls at whom, 64 nodes side by side in S slices; r rows of 64 neighbours.
+    """Neighbours of all nodes: S slices of 64 nodes, r rows of 64 neighbours.
 
     The first rows of a slice walk the rings of its nodes: the neighbours on the kept surface in order, first to last.
     The others are all remaining springs. Shorter lists are filled up with springs of no stiffness. The first `pieces`
@@ -35,26 +35,27 @@ class Slices(NamedTuple):
     lanes: np.ndarray
     """Lanes in use, (S,) int64."""
     first: np.ndarray
-    """Of a full slice whose nodes follow each other in memory the first, else -1, (S,) int64."""
+    """First node of a full slice whose nodes have consecutive numbers, else -1, (S,) int64."""
     start: np.ndarray
     """First row of each slice, (S + 1,) int64."""
     rings: np.ndarray
-    """How many of its rows are rings, (S,) int64."""
+    """Number of rows of each slice that are rings, (S,) int64."""
     neighbour: np.ndarray
     """(r, 64) uint32."""
     rest_length: np.ndarray
     """[m], (r, 64)."""
     stiffness: np.ndarray
-    """[N/m], (u, 64), each different row once: few where all springs of a kind have the same; 0 for no spring."""
+    """The u different rows of stiffnesses [N/m], (u, 64): few if all springs of a kind are equally stiff; 0 for no
+    spring."""
     stiffness_row: np.ndarray
-    """Which of them each row has, (r,) uint32."""
+    """Index into `stiffness` of each row, (r,) uint32."""
     inverse_mass: np.ndarray
     """[1/kg], (S, 64)."""
     pieces: int
     split_node: np.ndarray
     """Nodes in pieces, (q,) uint32."""
     split_start: np.ndarray
-    """Where the pieces of each begin, (q + 1,) int64."""
+    """First entry of each split node in `split_piece`, (q + 1,) int64."""
     split_piece: np.ndarray
     """Slice × 64 + lane of each piece, int64."""
     held_start: np.ndarray
@@ -62,6 +63,6 @@ class Slices(NamedTuple):
     held_lane: np.ndarray
     """Lanes of the nodes whose motion is prescribed, but for those in pieces, int64."""
     origin: int
-    """The node from which the volume is seen."""
+    """The node to which the positions are relative in the sum for the volume."""
     without_length: bool
     """Whether all springs have a rest length of 0."""

@@ -7,22 +7,22 @@ import numpy as np
 from massspring.kernels.jit.by_address import by_address
 
 SIZE = 64
-"""Volumes of a cluster: fewer take more iterations, the inverses of more take longer to read than they save."""
+"""Volumes of a cluster. Smaller clusters need more iterations; larger inverses take longer to read than they save."""
 
 
 @by_address
 class Clusters(NamedTuple):
-    """b clusters of m volumes that pull at each other's nodes; the last may be smaller."""
+    """b clusters of the m volumes, each of strongly coupled volumes; the last cluster may be smaller."""
 
     order: np.ndarray
     """Volumes cluster by cluster, (m,) uint32."""
     inverse: np.ndarray
-    """Of S at rest in each, scaled to a diagonal of 1; columns of one after those of the other, 0 beyond its volumes,
-    (64 b, 64) float32: it need not be exact."""
+    """Inverse of S at rest in each cluster, scaled to a diagonal of 1; the columns of all clusters in turn, 0 beyond
+    the volumes of a cluster, (64 b, 64) float32. It need not be exact."""
     scale: np.ndarray
     """1/√S_rr of the volumes in that order, 0 for what nothing can push [√(kg/m⁴)], (m,)."""
     part: np.ndarray
-    """Scratch: what is asked of a cluster and its answer, (2, 64) float32."""
+    """Scratch: scaled residual of a cluster, and its product with the inverse, (2, 64) float32."""
 
 
 @by_address
@@ -30,8 +30,8 @@ class VolumeRows(NamedTuple):
     """m volumes: J = dV/dx as sparse rows with e entries, its transpose, and scratch."""
 
     target: np.ndarray
-    """Of each entry of J that is summed from areas its place among all, its place node by node, and the same two of the
-    entry that is its negative (again its own where none is), (c, 4) uint32."""
+    """For each entry of J that is summed from areas: its index in `value` and in `node_value`, then both indices of the
+    entry that is its negative (its own again if there is none), (c, 4) uint32."""
     ring_start: np.ndarray
     """First quadrangle in the ring of each summed entry, (c + 1,) uint32."""
     corner: np.ndarray
@@ -43,7 +43,7 @@ class VolumeRows(NamedTuple):
     column: np.ndarray
     """Node of each entry, (e,) uint32."""
     node_start: np.ndarray
-    """Where the entries of each node begin in the next two, (n + 1,) uint32."""
+    """First entry of each node in `node_entry` and `node_row`, (n + 1,) uint32."""
     node_entry: np.ndarray
     """Entries node by node, volumes ascending, (e,) uint32."""
     node_row: np.ndarray
@@ -55,17 +55,17 @@ class VolumeRows(NamedTuple):
     volume: np.ndarray
     """V_r [m³], (m,)."""
     lam: np.ndarray
-    """Multipliers, on the way in those of the last step [Pa], (m,)."""
+    """Multipliers [Pa], (m,); on entry those of the last step."""
     push: np.ndarray
     """Jᵀ lam, the force of all volumes on each node [N], (n, 3)."""
     right: np.ndarray
-    """What the multipliers of the moment leave of the right-hand side [m³/s²], (m,)."""
+    """Residual of the right-hand side with the current multipliers [m³/s²], (m,)."""
     free_diagonal: np.ndarray
     """S_rr without contact [m⁴/kg], (m,)."""
     diagonal: np.ndarray
     """S_rr [m⁴/kg], (m,)."""
     clusters: Clusters
-    """Of no volume where S is solved densely."""
+    """Empty if S is solved densely."""
     matrix: np.ndarray
     """S [m⁴/kg], (m, m); (0, 0) where it is solved iteratively."""
     search: np.ndarray

@@ -1,1 +1,1 @@
-"""Pressures that keep volumes."""
+"""Kernels for the pressures (Lagrange multipliers) that keep volumes."""

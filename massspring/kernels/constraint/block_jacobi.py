@@ -1,4 +1,5 @@
-"""A preconditioner for many multipliers: S⁻¹ within clusters of volumes, as if nothing lay between them (eq. 8.7)."""
+"""A preconditioner for many multipliers: S⁻¹ within clusters of volumes, without the coupling between clusters (eq.
+8.7)."""
 
 import math
 from typing import Any
@@ -16,20 +17,21 @@ from massspring.kernels.jit.simd4 import plus, spread_over
 
 @njit_exposed
 def scale_into(clusters, diagonal):
-    """1/√S_rr of today's S: the inverse follows when volumes grow or obstacles take directions from their nodes."""
+    """1/√S_rr of the current S, by which the inverse at rest is scaled as volumes grow or contact removes
+    directions."""
     for k in range(clusters.order.shape[0]):
         own = diagonal[clusters.order[k]]
         clusters.scale[k] = 1.0 / math.sqrt(own) if own > 0.0 else 0.0
 
 
 def answer(inverse, first, part):
-    """part[1] = inverse part[0] of the cluster that begins at row `first`; the inverse is symmetric."""
+    """part[1] = inverse · part[0] for the cluster that begins at row `first`; the inverse is symmetric."""
     part[1] = part[0] @ inverse[first : first + SIZE]
 
 
 @intrinsic
 def _answer(typingctx: Any, inverse: Any, first: Any, part: Any) -> Any:
-    """Column by column, all sums of the cluster in vector registers."""
+    """The product column by column, with all sums of the cluster in vector registers."""
 
     def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         numbers = ir.VectorType(ir.FloatType(), SIZE)

@@ -9,13 +9,13 @@ from massspring.kernels.contact.constrained_motion import pushed_by_into, unpush
 from massspring.kernels.jit.decorators import compiled, njit_inlined
 
 POLISHES = 4
-"""Newton steps after the closed form: each doubles the digits that cancellation has left of it."""
+"""Newton steps after the closed form: each doubles the number of digits that cancellation has left."""
 BEYOND = 1e-12
-"""A root this many times farther away than the linear step is round-off of one at infinity."""
+"""Linear step over root: below it the root is infinite but for round-off."""
 
 
 class LineSearch(NamedTuple):
-    """Where a step would end without pressure, and where a pressure moves it."""
+    """Positions at the end of a step without pressure, and their change per unit of pressure."""
 
     y: np.ndarray
     """y = x + dt ṽ [m], (n, 3)."""
@@ -40,7 +40,7 @@ def triple(a, b, c):
 def volume_cubic(y, d, triangles):
     """V(y + a d) = V + a G(y)·d + a² Σ y·g(d) + a³ V[d]: the four coefficients, on a closed surface (eq. 10.1).
 
-    y is seen from a node of the surface, so that no digits are lost far from the origin.
+    y is taken relative to a node of the surface, so that no digits are lost far from the origin.
     """
     o0, o1, o2 = y[triangles[0, 0], 0], y[triangles[0, 0], 1], y[triangles[0, 0], 2]
     k0, k1, k2, k3 = 0.0, 0.0, 0.0, 0.0

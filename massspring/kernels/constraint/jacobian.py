@@ -8,7 +8,7 @@ from massspring.kernels.jit.decorators import compiled, njit_lean
 from massspring.kernels.jit.row_sums import copy_scaled, sum_of_areas, sum_of_products, sum_of_scaled, sums_from_origin
 
 NEGLIGIBLE_DIAGONAL = 1e-12
-"""A diagonal or pivot this much smaller than what it was summed from is round-off."""
+"""Ratio to its summands below which a diagonal or pivot counts as round-off."""
 
 
 @compiled
@@ -107,7 +107,7 @@ def mobilised_into(rows, contacts, inverse_mass, p, u):
 
 @compiled
 def diagonal_into(rows, contacts, inverse_mass, diagonal):
-    """S_rr = Σ_j J_rj · W̃_j J_rj [m⁴/kg], (m,), from what it is without contact (eq. 3.4).
+    """S_rr = Σ_j J_rj · W̃_j J_rj [m⁴/kg], (m,), computed from its value without contact (eq. 3.4).
 
     0 where contact and held nodes leave nothing but round-off.
     """

@@ -1,4 +1,4 @@
-"""The multiplier of one volume, and how far a correction may move a node."""
+"""The multiplier of one volume, and the limit on how far its correction moves a node."""
 
 import math
 
@@ -7,7 +7,7 @@ from massspring.kernels.contact.node_contact import allowed_part, taken_share
 from massspring.kernels.jit.decorators import njit_exposed, njit_inlined, njit_lean
 
 NEGLIGIBLE_MOBILITY = 1e-12
-"""A mobility this much smaller than what it was taken from is round-off."""
+"""Ratio to the mobility without contact below which a mobility counts as round-off."""
 
 
 @njit_lean
@@ -15,7 +15,7 @@ def volume_multiplier(nodes, contacts, inverse_mass, volume_error, dt):
     """lam = [(V0 − V) − dt G·ṽ] / (dt² G·W̃·G) [Pa]: one division (eq. 3.3). Returns (lam, G·W̃·G).
 
     ṽ, W̃: velocity and inverse mass of a touched node act only along its obstacle (eq. 3.4). `volume_error` is V0 − V.
-    Limit: with no gradient there is nothing to push on; the caller skips when G·W̃·G is not positive.
+    Limit: without a gradient no pressure can act; lam is 0 if G·W̃·G is not positive.
     """
     flow = 0.0
     mobility = 0.0
@@ -41,7 +41,7 @@ def volume_multiplier(nodes, contacts, inverse_mass, volume_error, dt):
 
 @njit_exposed
 def multiplier_of_sums(nodes, contacts, inverse_mass, volume_error, dt, flow, mobility):
-    """The same from G·v* and G·W·G of all nodes, less what obstacles take of the few they touch (eq. 3.3, 3.4)."""
+    """The same from the sums G·v* and G·W·G over all nodes, corrected at the few touched nodes (eq. 3.3, 3.4)."""
     mode, direction, v_target, gradient, v_star = (
         contacts.mode,
         contacts.direction,
@@ -75,9 +75,10 @@ def steepest(gradient, inverse_mass):
 
 @njit_inlined
 def surely_short(volume_error, mobility, lightest, longest):
-    """Whether no node moves farther than `longest` [m] to make up for a wrong volume: |e| √(max w / G·W̃·G) ≤ longest.
+    """Whether correcting a volume error e surely moves no node farther than `longest` [m]: |e| √(max w / G·W̃·G) ≤
+    longest.
 
-    max_i w_i |G_i| ≤ √(max w · G·W̃·G) without contact; the true reach is looked for only when this bound fails.
+    max_i w_i |G_i| ≤ √(max w · G·W̃·G) without contact; the exact maximum is computed only if this bound fails.
     """
     return volume_error * volume_error * lightest <= longest * longest * mobility
 

@@ -99,7 +99,7 @@ def dot(a, b):
 
 @njit_reassociated
 def beyond(residual, allowed):
-    """How many volumes are farther off than allowed; one that is no number is not."""
+    """Number of volumes whose residual exceeds `allowed`; NaN does not count."""
     count = 0
     for r in range(residual.shape[0]):
         count += abs(residual[r]) > allowed[r]
@@ -119,7 +119,7 @@ def solve_iteratively(rows, contacts, inverse_mass, lam, allowed, most, pairs=No
     """lam += S⁻¹ rhs by conjugate gradients with clusters of S at rest as preconditioner (eq. 8.4, 8.7).
 
     Ends when |rhs − S Δlam|_r ≤ allowed_r for every volume, or after `most` iterations; returns their number. A volume
-    without a diagonal has nothing to push on and is left out.
+    with a diagonal of 0 cannot be corrected and is left out.
     """
     residual, search, image = rows.right, rows.search, rows.image
     for r in range(search.shape[0]):

@@ -9,7 +9,8 @@ from massspring.kernels.forces.volume import volume_gradient_into
 from massspring.kernels.jit.decorators import compiled, njit_inlined
 
 WRONG = 1e-6
-"""Of a volume: an error that is counted where nothing can correct it; 1 % of what a kept volume may be off."""
+"""Relative volume error above which a volume that cannot be corrected is counted; 1 % of the error that a kept volume
+may have."""
 
 
 @compiled
@@ -93,7 +94,7 @@ def apply_cells(contacts, inverse_mass, cells, p, scale, compliance, out):
 
 @compiled
 def any_idle(cells, compliance, tolerance):
-    """Whether a cell whose volume is still wrong has nothing to push on; for the diagonal and right side of a solve."""
+    """Whether a cell with a volume error has no gradient, from the diagonal and the right-hand side of the solve."""
     for t in range(cells.diagonal.shape[0]):
         rest = cells.rest_volume[t]
         if not cells.diagonal[t] > compliance * rest and abs(cells.right[t]) > tolerance * rest:
@@ -103,9 +104,10 @@ def any_idle(cells, compliance, tolerance):
 
 @compiled
 def solve_cells(nodes, contacts, inverse_mass, cells, dt, compliance, accuracy):
-    """(dt² J W̃ Jᵀ + C V0) p = V0 − V − dt J ṽ by conjugate gradients from the last p (eq. 10.13); their number.
+    """(dt² J W̃ Jᵀ + C V0) p = V0 − V − dt J ṽ by conjugate gradients from the last p (eq. 10.13); returns the number
+    of iterations.
 
-    Ends when |residual|_t ≤ tolerance · V_t0 for every tetrahedron. J at x. `cells.right` comes in as V.
+    Ends when |residual|_t ≤ tolerance · V_t0 for every tetrahedron. J is taken at x. On entry `cells.right` holds V.
     """
     scale = dt * dt
     unpushed_into(nodes, contacts, dt, cells.y)
@@ -144,7 +146,8 @@ def solve_cells(nodes, contacts, inverse_mass, cells, dt, compliance, accuracy):
 
 @compiled
 def next_search_into(cells, before, iteration):
-    """The next direction of conjugate gradients, preconditioned by the diagonal; r·D⁻¹r, which was `before`."""
+    """The next direction of conjugate gradients, preconditioned by the diagonal D; returns r·D⁻¹r, whose last value is
+    `before`."""
     residual, search = cells.right, cells.search
     rho = 0.0
     for t in range(residual.shape[0]):
@@ -162,7 +165,7 @@ def relax_cells(contacts, inverse_mass, cells, scale, compliance):
     """One sweep of XPBD: Δp = (V0 − V − C V0 p)/(dt² ∇V·W̃∇V + C V0), cell after cell, at y (eq. 10.14).
 
     `cells.y` moves by dt² W̃ ∇V Δp and `cells.push` [N] collects ∇V Δp; `scale` is dt².
-    Returns whether a wrong volume had nothing to push on.
+    Returns whether a volume with an error had no gradient.
     """
     idle = False
     y, tetrahedra, pressure, rest_volume = cells.y, cells.tetrahedra, cells.pressure, cells.rest_volume
@@ -222,9 +225,9 @@ def relax_whole(model, contacts, cells, target, scale, compliance, lam):
 
 @compiled
 def relax_sum(model, contacts, cells, target, scale, compliance):
-    """All pressures of cells by as much as mends the sum of their volumes (eq. 10.15).
+    """Changes the pressures of all cells by one amount that corrects the sum of their volumes (eq. 10.15).
 
-    Returns whether a wrong sum had nothing to push on."""
+    Returns whether the sum had an error but no gradient."""
     mean = mean_pressure(cells)
     lam, idle = relax_whole(model, contacts, cells, target, scale, compliance, mean)
     for t in range(cells.pressure.shape[0]):

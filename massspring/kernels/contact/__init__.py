@@ -1,1 +1,1 @@
-"""Which nodes touch, and what that takes from their motion."""
+"""Kernels for contact: which nodes touch obstacles, and the motion that contact removes."""

@@ -1,6 +1,6 @@
 """Which surface nodes lie on which obstacles during this step.
 
-What is rare (friction, two obstacles at once) has loops of its own in `kernels.contact.friction`, once per step.
+The rare cases (friction, a node on two obstacles) have separate loops in `kernels.contact.friction`, once per step.
 """
 
 import math
@@ -58,7 +58,8 @@ def release_all(contacts):
 
 @njit_inlined
 def register(contacts, count):
-    """Lists those of the first `count` nodes of `entering` that have been activated; their gap is settled."""
+    """Appends the activated ones among the first `count` nodes of `entering` to `active`, and sets their gap to
+    infinity."""
     active, entering, mode = contacts.active, contacts.entering, contacts.mode
     listed = contacts.active_count[0]
     for k in range(count):
@@ -72,7 +73,7 @@ def register(contacts, count):
 
 @njit_inlined
 def forget_released(contacts):
-    """Takes nodes that have been released from the list, so that one that comes back is in it once."""
+    """Removes released nodes from `active`, so that a node that touches again is listed once."""
     active, mode, kept = contacts.active, contacts.mode, 0
     for k in range(contacts.active_count[0]):
         i = active[k]
@@ -95,7 +96,8 @@ def predict_gaps(model, nodes, contacts, boundary, step, push, team):
 
 @njit_exposed
 def find_contacts(model, nodes, contacts, boundary, step, push, team):
-    """Touched nodes of the step when the push of the last one acts on them: u = v* + dt W f (eq. 3.7)."""
+    """Finds the touched nodes of the step, with the push f of the last step acting on them: u = v* + dt W f (eq.
+    3.7)."""
     release_all(contacts)
     predict_gaps(model, nodes, contacts, boundary, step, push, team)
     enter(model, nodes, contacts, boundary, step, push)
@@ -124,7 +126,7 @@ def enter(model, nodes, contacts, boundary, step, push):
 
 @njit_inlined
 def release_pulled(model, nodes, contacts, boundary, push):
-    """Releases nodes that their one obstacle would pull (eq. 3.8); how many."""
+    """Releases nodes that their only obstacle would pull (eq. 3.8); returns how many."""
     changes = 0
     for k in range(contacts.active_count[0]):
         i = contacts.active[k]
@@ -136,7 +138,7 @@ def release_pulled(model, nodes, contacts, boundary, push):
             contacts.v_target[i, 0] * n0 + contacts.v_target[i, 1] * n1 + contacts.v_target[i, 2] * n2
             < u0 * n0 + u1 * n1 + u2 * n2
         ):
-            # A released node is looked at again in the next pass, whatever the pressure becomes.
+            # The next pass checks a released node again, however the pressure changes.
             contacts.contact_id[i], contacts.mode[i], contacts.predicted_gap[i] = 0, FREE, 0.0
             changes += 1
     return changes

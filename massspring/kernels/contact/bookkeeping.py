@@ -1,4 +1,4 @@
-"""Velocities that obstacles leave to touched nodes, and the impulses of the obstacles."""
+"""Velocities of touched nodes after contact, and the impulses of the obstacles."""
 
 from massspring.kernels.contact.friction import impulse_shares
 from massspring.kernels.contact.modes import FREE, ON_EDGE
@@ -8,7 +8,7 @@ from massspring.kernels.jit.decorators import njit_inlined, njit_lean
 
 @njit_lean
 def book(contact_impulse, o, other, k0, k1, k2):
-    """Moves an impulse [N s] from the account of one obstacle to another's: an edge pushes with both."""
+    """Moves an impulse [N s] from obstacle o to `other`, since both obstacles of an edge push."""
     contact_impulse[o, 0] -= k0
     contact_impulse[o, 1] -= k1
     contact_impulse[o, 2] -= k2
@@ -19,7 +19,7 @@ def book(contact_impulse, o, other, k0, k1, k2):
 
 @njit_inlined
 def settled(contacts, i, u0, u1, u2):
-    """What obstacles make of the velocity of a node they touch [m/s], P u + v_target (eq. 3.5)."""
+    """Velocity of a touched node after contact [m/s], P u + v_target (eq. 3.5)."""
     d0, d1, d2 = contacts.direction[i, 0], contacts.direction[i, 1], contacts.direction[i, 2]
     p0, p1, p2 = allowed_part(contacts.mode[i], d0, d1, d2, u0, u1, u2)
     return p0 + contacts.v_target[i, 0], p1 + contacts.v_target[i, 1], p2 + contacts.v_target[i, 2]
@@ -27,7 +27,7 @@ def settled(contacts, i, u0, u1, u2):
 
 @njit_inlined
 def book_contacts(model, nodes, contacts, push, dt, contact_impulse):
-    """Adds the impulse of each obstacle, m (v⁺ − u) [N s] (eq. 3.5); u is what a node would do without them."""
+    """Adds the impulse of each obstacle, m (v⁺ − u) [N s] (eq. 3.5); u is the velocity without contact."""
     v_star, direction, mode = nodes.v_star, push.direction, contacts.mode
     real = nodes.x.dtype.type
     impulse = real(dt * push.factor)

@@ -1,4 +1,4 @@
-"""What contact lets through: motion without pressure, and motion by a force."""
+"""Motion that contact allows: without pressure, and by a force."""
 
 from massspring.kernels.contact.modes import FREE
 from massspring.kernels.contact.node_contact import allowed_part
@@ -21,7 +21,7 @@ def unpushed_into(nodes, contacts, dt, y):
 
 @compiled
 def pushed_by_into(contacts, inverse_mass, factor, force, d):
-    """d = factor · W̃ F, (n, 3): what a force on every node moves, where contact and held nodes let it (eq. 3.4)."""
+    """d = factor · W̃ F, (n, 3): displacement by a force on every node, with contact and held nodes (eq. 3.4)."""
     for i in range(d.shape[0]):
         push = factor * inverse_mass[i]
         d0, d1, d2 = push * force[i, 0], push * force[i, 1], push * force[i, 2]

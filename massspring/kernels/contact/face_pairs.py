@@ -1,7 +1,7 @@
 """Contact between the faces of a cut: pairs of a node and its copy, without friction (docs/theory.md, section 9).
 
-A pair takes one direction from the motion of two nodes, what obstacles take from each of them before. No node is in two
-pairs, so that each is eliminated by a division, and what is left to the volumes is a mobility as any other.
+A touching pair removes one direction from the relative motion of its two nodes, after obstacles have removed theirs. No
+node is in two pairs, so a division eliminates each pair, and the volumes see only a changed mobility.
 """
 
 import math
@@ -12,12 +12,12 @@ from massspring.kernels.contact.node_contact import allowed_part
 from massspring.kernels.jit.decorators import compiled, njit_inlined, njit_lean
 
 NEGLIGIBLE = 1e-12
-"""What obstacles leave of a pair's mobility is round-off below this."""
+"""Ratio to the mobility without obstacles below which the mobility of a pair counts as round-off."""
 
 
 @compiled
 def normals_into(pairs, x):
-    """n of all pairs: along the sum of the areas of the triangles around both copies (eq. 9.8)."""
+    """n of all pairs: parallel to the sum of the area vectors of the triangles around both nodes (eq. 9.8)."""
     corner, pair, normal = pairs.corner, pairs.pair, pairs.normal
     normal[:] = 0.0
     for t in range(corner.shape[0]):
@@ -94,7 +94,7 @@ def turn_faces(pairs, x, inverse_mass, v_star, gradient):
 
 @njit_inlined
 def velocity_of(model, nodes, contacts, push, dt, i):
-    """What node i would do but for its pair [m/s]: ṽ + dt W̃ f (eq. 3.4, 3.5)."""
+    """Velocity of node i without the impulse of its pair [m/s]: ṽ + dt W̃ f (eq. 3.4, 3.5)."""
     w, direction, v_star = dt * push.factor * model.inverse_mass[i], push.direction, nodes.v_star
     u0, u1 = v_star[i, 0] + w * direction[i, 0], v_star[i, 1] + w * direction[i, 1]
     u2 = v_star[i, 2] + w * direction[i, 2]
@@ -134,11 +134,11 @@ def apart(pairs, p, u, v):
 
 @njit_lean
 def revise_pairs(pairs, model, nodes, contacts, push, dt):
-    """A pair touches where it would overlap at the end of the step but for its own impulse (eq. 9.9): pairs that enter
-    are added, those that would pull released; how many.
+    """A pair touches if it would overlap at the end of the step without its impulse (eq. 9.9). Adds pairs that would
+    overlap, releases those that would pull, and returns the number of changes.
 
-    A uniform pressure on a quadratic face leaves nothing at its corners, so the sign of what a corner gets says
-    nothing: among mid-sides that all touch it touches too.
+    A uniform pressure on a quadratic face gives no force at its corners, so the sign of the impulse of a corner is
+    meaningless: a corner also touches if all mid-sides around it touch.
     """
     changes = 0
     for corners in (False, True):
@@ -164,8 +164,8 @@ def is_enclosed(pairs, p):
 
 @njit_lean
 def part_faces(pairs, contacts, inverse_mass, u, dt, closing):
-    """u of touching pairs, (n, 3 or more), with the impulse that ends the step at gap 0 (eq. 9.10); where not `closing`
-    that of a motion alone, with no gap to make up for: Ŵ f from W̃ f."""
+    """Adds to u, (n, 3 or more), the impulse of each touching pair that ends the step at gap 0 (eq. 9.10). If not
+    `closing`, the gap is ignored, which turns W̃ f into Ŵ f."""
     if pairs is None:
         return
     for p in range(pairs.gap.shape[0]):
@@ -182,7 +182,7 @@ def part_faces(pairs, contacts, inverse_mass, u, dt, closing):
 
 @njit_lean
 def less_of_pairs(pairs, model, nodes, contacts, flow, mobility, dt):
-    """G·v̂ [m³/s] and G·Ŵ·G [m⁴/kg] from G·ṽ and G·W̃·G: what touching pairs take (eq. 9.10)."""
+    """G·v̂ [m³/s] and G·Ŵ·G [m⁴/kg] from G·ṽ and G·W̃·G, less the parts that touching pairs remove (eq. 9.10)."""
     if pairs is None:
         return flow, mobility
     gradient, weights = nodes.gradient, model.inverse_mass
@@ -231,7 +231,7 @@ def less_of_pairs_in(matrix, pairs, rows, contacts, inverse_mass):
 
 @njit_lean
 def press_pairs(pairs, model, nodes, contacts, push, dt):
-    """v* of touching pairs with the impulse k n [N s] of each (eq. 9.10): what follows knows it as a force."""
+    """Adds the impulse k n [N s] of each touching pair to v* (eq. 9.10), so that later stages treat it as a force."""
     if pairs is None:
         return
     for p in range(pairs.gap.shape[0]):

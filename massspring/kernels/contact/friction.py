@@ -8,7 +8,7 @@ from massspring.kernels.contact.node_contact import allowed_part
 from massspring.kernels.jit.decorators import njit_inlined, njit_lean
 
 SLIPS = 1.0 + 1e-9
-"""Round-off must not turn a node that just sticks into one that slips."""
+"""Factor on the friction limit, so that round-off does not make a sticking node slip."""
 PARALLEL = 1e-4
 """Squared sine between two normals (0.6°) below which they count as one: there is no edge to slide along."""
 
@@ -43,7 +43,8 @@ def apply_friction(model, nodes, contacts, boundary, step, push):
 
 @njit_lean
 def release_slipping(model, nodes, contacts, boundary, push):
-    """Lets nodes slip that stick although the solved pressure asks for more than mu times its normal part (eq. 9.1)."""
+    """Makes sticking nodes slip whose tangential impulse with the solved pressure exceeds mu times the normal one (eq.
+    9.1)."""
     changes = 0
     for k in range(contacts.active_count[0]):
         i = contacts.active[k]
@@ -83,7 +84,7 @@ def onto_edge(contacts, i, a, b, edge):
 
 @njit_lean
 def activate_edges(model, nodes, contacts, boundary, step, push):
-    """Puts nodes that would leave their obstacle into another on the edge e = n × n' of both (eq. 9.2); how many.
+    """Puts touched nodes that would enter a second obstacle on the edge e = n × n' of both (eq. 9.2); returns how many.
 
     Obstacles that face each other have no edge: the deeper one wins, and the other's penetration is recorded.
     """
@@ -134,14 +135,15 @@ def impulse_shares(k, n, m):
 
 @njit_lean
 def release_edges(model, nodes, contacts, boundary, push):
-    """Frees nodes on an edge that one of their obstacles would pull; the next search finds the other (eq. 9.2)."""
+    """Releases nodes on an edge that one of the two obstacles would pull; the next search finds the other obstacle (eq.
+    9.2)."""
     changes = 0
     for k in range(contacts.active_count[0]):
         i = contacts.active[k]
         if contacts.mode[i] != ON_EDGE:
             continue
         u0, u1, u2 = pushed_velocity(model, nodes, boundary, push, i)
-        # What the edge leaves free is at right angles to both normals and takes no share.
+        # The free direction along the edge is orthogonal to both normals and does not contribute.
         n = contacts.normal[i, 0], contacts.normal[i, 1], contacts.normal[i, 2]
         m = contacts.second_normal[i, 0], contacts.second_normal[i, 1], contacts.second_normal[i, 2]
         alpha, beta = impulse_shares(

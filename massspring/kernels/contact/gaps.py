@@ -1,7 +1,7 @@
-"""How far nodes end the predicted step from obstacles: all of them side by side, or one.
+"""Distances of nodes from obstacles at the end of the predicted step: for all nodes at once, or for one.
 
-In the loops over all nodes literals such as 0.0 are avoided: they turn one over single numbers into one over double
-ones.
+The loops over all nodes avoid literals such as 0.0: these are float64 and would turn a loop over float32 into one over
+float64.
 """
 
 import math
@@ -74,7 +74,7 @@ def capsule_gap(course, predicted_gap, p, a, radius):
 
 @njit_inlined
 def pushed_velocity(model, nodes, boundary, push, i):
-    """u = v* + dt W f of node i when what keeps volumes acts as a force f [m/s] (eq. 3.7)."""
+    """u = v* + dt W f of node i [m/s], with the push on volumes as force f (eq. 3.7)."""
     w, direction = boundary.dt * push.factor * model.inverse_mass[i], push.direction
     u0 = nodes.v_star[i, 0] + w * direction[i, 0]
     u1 = nodes.v_star[i, 1] + w * direction[i, 1]
@@ -84,9 +84,10 @@ def pushed_velocity(model, nodes, boundary, push, i):
 
 @njit_inlined
 def gap_and_normal(boundary, o, r0, r1, r2):
-    """Distance [m] of r to obstacle o, negative inside, and its normal there; r is seen from the obstacle's position.
+    """Distance [m] of r to obstacle o, negative inside, and its normal there; r is relative to the position of the
+    obstacle.
 
-    On the axis of a round one the normal is not a number.
+    On the axis of a sphere or capsule the normal is NaN.
     """
     if boundary.is_plane[o]:
         n0, n1, n2 = boundary.plane_normal[o, 0], boundary.plane_normal[o, 1], boundary.plane_normal[o, 2]

@@ -1,7 +1,7 @@
-"""Where a node is beside an obstacle, and what motion an obstacle leaves it.
+"""Position of a node relative to an obstacle, and the motion that contact allows it.
 
-These functions know numbers alone, no arrays: the same ones serve a node, a point of a probe, and loops over all nodes,
-in either precision.
+These functions take numbers, not arrays, so that nodes, points of probes and loops over all nodes can share them, in
+either precision.
 """
 
 import math
@@ -12,7 +12,8 @@ from massspring.kernels.jit.decorators import njit_lean
 
 @njit_lean
 def allowed_part(mode, d0, d1, d2, g0, g1, g2):
-    """P g, what obstacles leave of a vector: P = I − n nᵀ on one, e eᵀ on two, 0 where a node sticks (eq. 3.4)."""
+    """P g, the part of a vector that obstacles allow: P = I − n nᵀ on one, e eᵀ on two, 0 where a node sticks (eq.
+    3.4)."""
     along = g0 * d0 + g1 * d1 + g2 * d2
     if mode == SLIDES:
         return g0 - along * d0, g1 - along * d1, g2 - along * d2
@@ -23,7 +24,7 @@ def allowed_part(mode, d0, d1, d2, g0, g1, g2):
 
 @njit_lean
 def taken_share(mode, d, g, v):
-    """g·(I − P) v, what obstacles take of a product (eq. 3.4)."""
+    """g·(I − P) v, the part of a product that obstacles remove (eq. 3.4)."""
     along = (g[0] * d[0] + g[1] * d[1] + g[2] * d[2]) * (v[0] * d[0] + v[1] * d[1] + v[2] * d[2])
     if mode == SLIDES:
         return along
@@ -35,7 +36,8 @@ def taken_share(mode, d, g, v):
 def axis_share(r0, r1, r2, s0, s1, s2):
     """Where on a segment 0 … s the point nearest to r lies, 0 … 1; 0 where s has no length.
 
-    Constants of the type of its numbers: a double among floats makes the loop over all nodes three times slower.
+    Constants have the type of the arguments: a float64 constant among float32 numbers makes the loop over all nodes
+    three times slower.
     """
     square = s0 * s0 + s1 * s1 + s2 * s2
     real = type(square)
@@ -53,11 +55,11 @@ def round_gap(r0, r1, r2, a0, a1, a2, radius):
 
 @njit_lean
 def sphere_contact(s, r, radius):
-    """(normal, lift) of a node at s now and at r after the predicted step, seen from the centre [m] (eq. 3.7).
+    """(normal, lift) of a node at s now and at r after the predicted step, both relative to the centre [m] (eq. 3.7).
 
     n = s/|s|; the node ends the step at n·r⁺ = n·r + lift = √(R² − |r − n (n·r)|²), on the sphere, moved along n alone.
-    A node that slides farther than R within a step has no such point: it ends on the tangent plane at r/|r|. Inverse
-    lengths are infinite at the very centre, and the run has diverged.
+    A node that slides farther than R within a step has no such point: it ends on the tangent plane at r/|r|. At the
+    centre inverse lengths are infinite; the run has then diverged.
     """
     s0, s1, s2 = s
     r0, r1, r2 = r
@@ -74,7 +76,7 @@ def sphere_contact(s, r, radius):
 def round_contact(s, r, a, radius):
     """`sphere_contact` with the sphere around the nearest point of an axis 0 … a, a capsule's; a = 0: a sphere's.
 
-    Along the side both points are seen from the axis. A node that passes from side to end ends on the tangent plane.
+    Along the side both points are relative to the axis. A node that passes from side to end ends on the tangent plane.
     """
     now = axis_share(s[0], s[1], s[2], a[0], a[1], a[2])
     then = axis_share(r[0], r[1], r[2], a[0], a[1], a[2])

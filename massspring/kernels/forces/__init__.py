@@ -1,1 +1,1 @@
-"""One equation per function."""
+"""Forces and energies, one equation per function."""

@@ -11,10 +11,11 @@ from massspring.kernels.forces.elements import deformation, scatter
 from massspring.kernels.jit.decorators import compiled, njit_exposed, njit_inlined, njit_lean
 
 MOST_STEPS = 60
-"""Of Newton's method for the trace: about six where the rotation is well defined; a double root halves the distance in
-each."""
+"""Most steps of Newton's method for the trace. It takes about six if the rotation is well defined; at a double root
+each step only halves the error."""
 UNDEFINED = 1e-7
-"""Of the cubed trace: below it two rotations are equally near to F; a double root is known to √round-off alone."""
+"""Share of the cubed trace below which two rotations count as equally near to F: a double root is accurate only to the
+square root of round-off."""
 
 
 @njit_inlined
@@ -109,7 +110,8 @@ def corotated_energy(elements, x):
 
 @njit_lean
 def corotated_forces_into(elements, x, force):
-    """f_a = −V_e (mu F + (λ (s − 2 − J*) − 2 mu) R) ∇N_a [N], (n, 3) (eq. 13.12); whether a rotation is undefined."""
+    """f_a = −V_e (mu F + (λ (s − 2 − J*) − 2 mu) R) ∇N_a [N], (n, 3) (eq. 13.12). Returns whether a rotation is
+    undefined."""
     mu, second = lame(elements)
     force[:] = 0.0
     node, gradient, idle = elements.node, elements.gradient, False
@@ -160,7 +162,8 @@ def turn_gradients(elements, r, e):
 
 @njit_inlined
 def corotated_block(elements, volume, factor, m):
-    """V (mu g_a·g_b 1 + λ g_a ⊗ g_b + `factor` [g_a]ᵀ m [g_b]) to `block` for a ≤ b, [g] e = g × e (eq. 13.13)."""
+    """Writes V (mu g_a·g_b 1 + λ g_a ⊗ g_b + `factor` [g_a]ᵀ m [g_b]) to `block` for a ≤ b, [g] e = g × e (eq.
+    13.13)."""
     mu, second = lame(elements)
     turned, block = elements.area, elements.block
     m00, m01, m02, m11, m12, m22 = m
@@ -186,8 +189,8 @@ def corotated_block(elements, volume, factor, m):
 
 @compiled
 def add_corotated_stiffness(elements, places, x, factor, exact, data):
-    """`factor` times the derivative of (13.12) of the free nodes to `data` (eq. 13.13); not `exact`: the usual R K Rᵀ
-    of Müller and Gross, the stiffness at rest turned with the element, which with the springs is positive."""
+    """Adds `factor` times minus the derivative of (13.12) for the free nodes to `data` (eq. 13.13). If not `exact`: R K
+    Rᵀ of Müller and Gross, the rotated stiffness at rest, which is positive together with the springs."""
     mu, second = lame(elements)
     for e in range(elements.node.shape[0]):
         f = deformation(elements, x, e, 0)

@@ -1,4 +1,4 @@
-"""Elements with a volume penalty of their own, linear or quadratic: energy, forces and stiffness (docs/theory.md,
+"""Linear or quadratic elements with a volume penalty at every point: energy, forces and stiffness (docs/theory.md,
 section 13)."""
 
 from typing import NamedTuple
@@ -9,12 +9,12 @@ from massspring.kernels.jit.by_address import by_address
 from massspring.kernels.jit.decorators import compiled, njit_inlined, njit_lean
 
 FLAT = 1e-20
-"""Of the square of ∂J/∂x at rest: what is left of it is round-off."""
+"""Share of its square at rest below which ∂J/∂x counts as zero."""
 
 
 @by_address
 class Elements(NamedTuple):
-    """k elements of a nodes with q points each; their shear is in the springs without length of the body."""
+    """k elements of a nodes with q points each. The springs without length of the body carry their shear energy."""
 
     node: np.ndarray
     """(k, a) int64."""
@@ -25,7 +25,7 @@ class Elements(NamedTuple):
     constants: np.ndarray
     """mu, K and the bulk modulus b of the springs' own volume term [Pa], (3,)."""
     target_ratio: np.ndarray
-    """J* of each point: what its target is over its rest volume [1], (k, q); of the step at hand."""
+    """J* of each point: target over rest volume in the current step [1], (k, q)."""
     area: np.ndarray
     """Scratch: D_a = w cof F ∇N_a [m²] of one point, (a, 3)."""
     block: np.ndarray
@@ -33,12 +33,12 @@ class Elements(NamedTuple):
 
 
 class Places(NamedTuple):
-    """Where the entries of the stiffness of free nodes are among the data of its rows."""
+    """Indices of the stiffness entries of free nodes in the data of the sparse matrix."""
 
     entry: np.ndarray
-    """Of the first entry of each 3 × 3 block of an element, (k, a, a) int64; −1 where a node is held."""
+    """Index of the first entry of each 3 × 3 block of an element, (k, a, a) int64; −1 if a node is held."""
     width: np.ndarray
-    """From a row of a block to the next, of the blocks in the rows of each node, (n,) int64."""
+    """Distance in the data between two rows of a block, for each node that owns the rows, (n,) int64."""
 
 
 @njit_inlined
@@ -57,7 +57,7 @@ def deformation(elements, x, e, q):
 
 @njit_inlined
 def open_element_point(elements, f, e, q):
-    """D_a = w cof F ∇N_a into `area` (eq. 8.10); J and Σ |D_a|² over what it is at rest."""
+    """D_a = w cof F ∇N_a into `area` (eq. 8.10). Returns J, and Σ |D_a|² over its value at rest."""
     f00, f01, f02, f10, f11, f12, f20, f21, f22 = f
     c00, c01, c02 = f11 * f22 - f12 * f21, f12 * f20 - f10 * f22, f10 * f21 - f11 * f20
     c10, c11, c12 = f21 * f02 - f22 * f01, f22 * f00 - f20 * f02, f20 * f01 - f21 * f00
@@ -96,7 +96,7 @@ def element_energy(elements, x):
 
 @njit_lean
 def element_forces_into(elements, x, force):
-    """f_a = Σ_q p_q D_qa [N], (n, 3) (eq. 13.4); whether a wrong volume of a point has no gradient left."""
+    """f_a = Σ_q p_q D_qa [N], (n, 3) (eq. 13.4). Returns whether the volume of a point has no gradient."""
     force[:] = 0.0
     node, area, idle = elements.node, elements.area, False
     for e in range(node.shape[0]):
@@ -114,7 +114,7 @@ def element_forces_into(elements, x, force):
 
 @njit_inlined
 def add_point_stiffness(elements, f, stiff, turning, place):
-    """`stiff` D_a ⊗ D_b − `turning` ∂²J/∂x_a∂x_b of a point (e, q) to `block`, for a ≤ b (eq. 8.14, 13.5)."""
+    """Adds `stiff` D_a ⊗ D_b − `turning` ∂²J/∂x_a∂x_b of a point (e, q) to `block`, for a ≤ b (eq. 8.14, 13.5)."""
     e, q = place
     gradient, area, block = elements.gradient, elements.area, elements.block
     f00, f01, f02, f10, f11, f12, f20, f21, f22 = f
@@ -141,7 +141,7 @@ def add_point_stiffness(elements, f, stiff, turning, place):
 
 @njit_inlined
 def scatter(elements, places, e, factor, data):
-    """`factor` times the stiffness in `block` of element e, and its mirror image, to the data of the rows."""
+    """Adds `factor` times the stiffness in `block` of element e, and its transpose, to the data of the matrix."""
     node, block, entry, width = elements.node, elements.block, places.entry, places.width
     for a in range(node.shape[1]):
         for b in range(node.shape[1]):
@@ -156,8 +156,8 @@ def scatter(elements, places, e, factor, data):
 
 @compiled
 def add_element_stiffness(elements, places, x, factor, exact, data):
-    """`factor` Σ_q (K + b)/w D ⊗ D − p w ∂²J/∂x² of the free nodes to `data` (eq. 13.5); not `exact`: the first part,
-    which is positive."""
+    """Adds `factor` Σ_q (K + b)/w D ⊗ D − p w ∂²J/∂x² of the free nodes to `data` (eq. 13.5). If not `exact`: only the
+    first term, which is positive."""
     bulk, local = elements.constants[1], elements.constants[2]
     for e in range(elements.node.shape[0]):
         elements.block[:] = 0.0

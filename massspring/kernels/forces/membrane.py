@@ -7,7 +7,7 @@ from massspring.kernels.jit.decorators import njit_lean
 def add_membrane_forces(x, membrane, force):
     """f_b += 2 g_a (x_c − x_b), f_c −= the same [N], (n, 3), with g_a = k_a Δ_a + c_b Δ_c + c_c Δ_b (eq. 4.6).
 
-    Δ_a = |x_c − x_b|² − L_a² of the edge opposite node a. Zero at rest; internal: no sum, no moment.
+    Δ_a = |x_c − x_b|² − L_a² of the edge opposite node a. Zero at rest; internal: forces and moments sum to zero.
     """
     for t in range(membrane.triangles.shape[0]):
         i, j, k = membrane.triangles[t, 0], membrane.triangles[t, 1], membrane.triangles[t, 2]

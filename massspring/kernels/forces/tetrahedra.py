@@ -1,4 +1,4 @@
-"""How far each tetrahedron is from its rest volume."""
+"""Volumes of tetrahedra, and their smallest ratio to the rest volumes."""
 
 from massspring.kernels.jit.decorators import compiled
 

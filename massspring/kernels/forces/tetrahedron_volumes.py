@@ -1,4 +1,4 @@
-"""Every tetrahedron keeps its own volume: forces of known pressures (docs/theory.md, section 10)."""
+"""Forces of methods that keep the volume of every tetrahedron by an explicit pressure (docs/theory.md, section 10)."""
 
 import math
 from typing import NamedTuple
@@ -12,7 +12,7 @@ from massspring.kernels.jit.decorators import compiled, njit_exposed, njit_inlin
 
 @by_address
 class Cells(NamedTuple):
-    """k tetrahedra with what a method remembers of each, and scratch arrays."""
+    """k tetrahedra with the state that a method stores for each, and scratch arrays."""
 
     tetrahedra: np.ndarray
     """(k, 4) uint32, positive at rest."""
@@ -21,9 +21,9 @@ class Cells(NamedTuple):
     rest_reach: np.ndarray
     """Σ_j |r_j| at rest, r_j from the barycentre to node j [m], (k,)."""
     rest_whole: float
-    """The kept volume at rest [m³]: what targets refer to."""
+    """The kept volume at rest [m³], to which targets are relative."""
     filling: np.ndarray
-    """What every cell should have of its rest volume [1], (1,)."""
+    """Target of every cell over its rest volume [1], (1,)."""
     pressure: np.ndarray
     """p_t [Pa], (k,)."""
     push: np.ndarray
@@ -58,7 +58,8 @@ def cell_slopes(x, a, b, c, d):
 
 @njit_inlined
 def add_four(out, nodes, f, p, q, r):
-    """Adds f p, f q, f r to the last three of four nodes and minus their sum to the first: net force 0."""
+    """Adds f p, f q, f r to the last three of four nodes and minus their sum to the first, so that the net force is
+    0."""
     a, b, c, d = nodes
     p0, p1, p2 = f * p[0], f * p[1], f * p[2]
     q0, q1, q2 = f * q[0], f * q[1], f * q[2]
@@ -79,7 +80,7 @@ def add_four(out, nodes, f, p, q, r):
 
 @compiled
 def fill(cells, boundary, step):
-    """The target of the whole in this step, as what every cell should have of its rest volume."""
+    """Sets `filling`: the target of the whole volume in this step over its rest volume."""
     cells.filling[0] = boundary.volume_target[step, 0] / cells.rest_whole
 
 
@@ -87,7 +88,7 @@ def fill(cells, boundary, step):
 def add_volume_forces(x, cells, bulk_modulus, force):
     """f_j = Σ_t p_t dV_t/dx_j, p_t = K (V_t0 − V_t)/V_t0 [N], (n, 3) (eq. 10.11).
 
-    Returns whether a cell has collapsed so far that its volume has no gradient.
+    Returns whether a cell has collapsed so that its volume has no gradient.
     """
     tetrahedra, filling, idle = cells.tetrahedra, cells.filling[0], False
     for t in range(tetrahedra.shape[0]):
@@ -112,7 +113,7 @@ def unit(r0, r1, r2):
 def add_barycentre_forces(x, cells, bulk_modulus, force):
     """f_j = −k s (r_j/|r_j| − mean), s = Σ|r_j| − Σ|r_j|_0, k = 9 K V_t0/(Σ|r_j|_0)² [N], (n, 3) (eq. 10.12).
 
-    Without the mean, as published, a cell that is not regular would push itself about.
+    Without the mean, as published, an irregular cell would exert a net force on itself.
     """
     tetrahedra, wider = cells.tetrahedra, np.cbrt(cells.filling[0])
     for t in range(tetrahedra.shape[0]):

@@ -7,7 +7,7 @@ from massspring.kernels.jit.decorators import compiled
 def enclosed_volume(x, triangles):
     """V = (1/6) Σ_f x_i · (x_j × x_k) [m³] (eq. 2.1).
 
-    Seen from a node of the surface, so that no digits are lost far from the origin.
+    Positions are relative to a node of the surface, so that no digits are lost far from the origin.
     """
     o0, o1, o2 = x[triangles[0, 0], 0], x[triangles[0, 0], 1], x[triangles[0, 0], 2]
     six = 0.0
@@ -24,7 +24,8 @@ def enclosed_volume(x, triangles):
 def volume_gradient_into(x, triangles, gradient):
     """G_i = dV/dx_i = (1/6) Σ_f∋i (x_j - x_i) × (x_k - x_i) [m²], (n, 3); returns V [m³] (eq. 2.1, 2.2).
 
-    Around a node of a closed surface this is the sum of x_j × x_k: one area vector a triangle serves all three nodes.
+    Around a node of a closed surface this is the sum of x_j × x_k: one area vector per triangle is enough for its three
+    nodes.
     Identities: Σ G = 0, Σ x × G = 0, Σ x·G = 3 V.
     """
     gradient[:] = 0.0

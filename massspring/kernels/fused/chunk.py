@@ -1,23 +1,23 @@
-"""64 nodes side by side: what a pass over them leaves in memory, and how it goes to the nodes from there."""
+"""The tile: scratch memory of a pass over 64 nodes, with functions that fill it and copy it to the nodes."""
 
 from massspring.kernels.jit.decorators import njit_inlined
 from massspring.kernels.jit.flat import flat
 
 LANES = 64
-"""Nodes side by side."""
+"""Nodes per slice."""
 VECTOR = 3 * LANES
 FORCE, AREA, HERE, SUMS, THERE = (VECTOR * block for block in range(5))
-"""Where blocks of a tile begin: x, y, z of all f_i, of 6 G_i, of v*; shares of the lanes in G·v* and G·W·G; then
-what is read and written node by node."""
+"""First index of the blocks of a tile: x, y, z of all f_i, of 6 G_i, of v*; contributions of the lanes to G·v* and
+G·W·G; numbers read and written node by node."""
 RESULT = 2 * VECTOR
 SHARE, SPEED = THERE, THERE
-"""Shares of the lanes in 18 V; v, then v*, three numbers a lane."""
+"""Contributions of the lanes to 18 V; v, then v*, three numbers per lane."""
 TILE = 5 * VECTOR
 
 
 @njit_inlined
 def take(x, first, tile):
-    """The rows of 64 nodes that follow each other in memory into `THERE`."""
+    """Copies the rows of 64 nodes with consecutive numbers into `THERE`."""
     rows = flat(x, first, first + LANES)
     for k in range(VECTOR):
         tile[THERE + k] = rows[k]
@@ -37,7 +37,7 @@ def total(tile, at):
 
 @njit_inlined
 def put(tile, block, slices, s, x):
-    """x_i = the block of the tile, for the lanes in use."""
+    """Copies a block of the tile to x_i of the nodes, for the lanes in use."""
     for lane in range(LANES):
         at = THERE + 3 * lane
         tile[at], tile[at + 1] = tile[block + lane], tile[block + LANES + lane]

@@ -1,4 +1,4 @@
-"""What the pass over slices leaves to do: nodes whose neighbours fill several lanes, and triangle springs."""
+"""Work left after the pass over slices: nodes whose neighbours fill several lanes, and triangle springs."""
 
 from massspring.kernels.forces.membrane import add_membrane_forces
 from massspring.kernels.fused.chunk import AREA, FORCE, LANES
@@ -7,7 +7,7 @@ from massspring.kernels.jit.decorators import njit_lean
 
 @njit_lean
 def join_pieces(model, nodes, work, boundary, keeps):
-    """v* and G of the nodes in pieces, and their shares of G·v* and G·W·G in the last of `sums`."""
+    """v* and G of the nodes in pieces; their contributions to G·v* and G·W·G go into the last row of `sums`."""
     slices = model.slices
     keep = 1.0 - boundary.damping * boundary.dt
     flow, mobility = 0.0, 0.0
@@ -37,7 +37,8 @@ def join_pieces(model, nodes, work, boundary, keeps):
 def add_walls(model, nodes, dt):
     """v* += dt W f of the triangle springs [m/s]; returns what that adds to G·v* [m³/s].
 
-    `nodes.force` comes with the spring forces of held nodes alone, whose W is 0: theirs are added to.
+    On entry `nodes.force` holds the spring forces of held nodes, whose W is 0, and zeros elsewhere; the forces are
+    added to it.
     """
     flow = 0.0
     add_membrane_forces(nodes.x, model.membrane, nodes.force)

@@ -1,4 +1,4 @@
-"""Positions padded to four numbers, as one move of memory fetches them."""
+"""Positions padded to four numbers, so that one load fetches a node."""
 
 from massspring.kernels.jit.decorators import njit_inlined
 from massspring.kernels.jit.flat import flat
@@ -6,7 +6,7 @@ from massspring.kernels.jit.flat import flat
 
 @njit_inlined
 def pad_positions(nodes, work, first, last):
-    """The positions of some nodes in fours, as one move of memory fetches them, (n, 4)."""
+    """Copies the positions of nodes first ≤ i < last to `padded_positions`, (n, 4), so that one load fetches a node."""
     x, padded = flat(nodes.x, first, last), flat(work.padded_positions, first, last)
     zero = nodes.x.dtype.type(0)
     for i in range(last - first):

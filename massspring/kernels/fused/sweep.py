@@ -1,6 +1,7 @@
 """Springs, volume gradient and prediction of all nodes: one pass over their neighbours, 64 nodes at a time.
 
-Each spring is computed at both of its ends: nothing is scattered, and all lanes of a vector register do the same.
+Each spring is computed at both of its ends, so that no result is scattered and all lanes of a vector register do the
+same work.
 """
 
 from massspring.kernels.forces.springs import SHORTEST
@@ -15,8 +16,8 @@ from massspring.kernels.jit.vectors import at_least, gather, lanes_of, load, roo
 def gather_slice(padded, slices, s, keeps, shortest, o, tile):
     """f_i [N] (eq. 1.1) and, where a volume is kept, 6 G_i = Σ_k d_k × d_k+1 [m²] (eq. 2.4) of a slice; its share of V.
 
-    The share is the slice's in 18 V = Σ 6 G·(x − o); o is a node of the surface, so that no digits are lost far from
-    the origin.
+    Its share is the slice's contribution to 18 V = Σ 6 G·(x − o); o is a node of the surface, so that no digits are
+    lost far from the origin.
     """
     first, last = slices.start[s], slices.start[s + 1]
     ring_end = first + (slices.rings[s] if keeps else 0)
@@ -43,7 +44,7 @@ def gather_slice(padded, slices, s, keeps, shortest, o, tile):
 def walk_rings(padded, slices, first, last, lane, shortest, here):
     """f_i of the springs to the rings of some lanes, and 6 G_i.
 
-    d_k = x_k − x_i goes round the ring of neighbours of node i. Two products with a common factor are one:
+    d_k = x_k − x_i goes round the ring of neighbours of node i. Two cross products with a common factor are combined:
     d_k−1 × (d_k − d_k−2).
     """
     none = spread(0, padded)
@@ -75,7 +76,8 @@ def pulled_by(force, slices, row, lane, shortest, d):
 
 @njit_inlined
 def pulled_without_length(force, padded, slices, rows, lane, here):
-    """f_i + Σ k d [N] of rows of springs without length: neither root nor division; the same to the last bit."""
+    """f_i + Σ k d [N] over rows of springs without length, without root or division; identical to `pulled_by` to the
+    last bit."""
     for row in range(rows[0], rows[1]):
         d = minus(gather(padded, slices.neighbour, row, lane), here)
         k = load(slices.stiffness, slices.stiffness_row[row], lane)
@@ -109,7 +111,7 @@ def cross(a, b):
 
 @njit_inlined
 def save_three(vector, tile, at):
-    """The components into blocks of the tile that follow each other."""
+    """Stores the components in consecutive blocks of the tile."""
     save(vector[0], tile, at)
     save(vector[1], tile, at + LANES)
     save(vector[2], tile, at + 2 * LANES)
@@ -117,7 +119,7 @@ def save_three(vector, tile, at):
 
 @njit_inlined
 def predict_slice(nodes, slices, s, dt, keep, a, tile):
-    """v* (eq. 3.1) and G of the nodes of a slice in place of x and 6 G, and their shares of G·v* and G·W·G."""
+    """v* (eq. 3.1) and G of the nodes of a slice replace x and 6 G; also their contributions to G·v* and G·W·G."""
     v, node, inverse_mass = nodes.v, slices.node, slices.inverse_mass
     sixth = nodes.x.dtype.type(1.0 / 6.0)
     if slices.first[s] >= 0:
@@ -141,7 +143,7 @@ def predict_slice(nodes, slices, s, dt, keep, a, tile):
 
 @njit_inlined
 def keep_held(slices, s, force, tile):
-    """The spring forces of the held nodes of a slice [N]: what their attachments take."""
+    """Stores the spring forces on the held nodes of a slice [N], which their attachments balance."""
     for h in range(slices.held_start[s], slices.held_start[s + 1]):
         lane = slices.held_lane[h]
         i = slices.node[s, lane]
@@ -151,9 +153,9 @@ def keep_held(slices, s, force, tile):
 
 @njit_inlined
 def pass_slices(nodes, work, boundary, slices, part, keeps, tile):
-    """v* and G of the slices first ≤ s < last in `part`, with their shares of 18 V, G·v* and G·W·G in `sums`.
+    """v* and G of the slices first ≤ s < last in `part`, with their contributions to 18 V, G·v* and G·W·G in `sums`.
 
-    Of pieces f and 6 G alone.
+    For slices of pieces only f and 6 G.
     """
     real = nodes.x.dtype.type
     dt, keep = real(boundary.dt), real(1.0 - boundary.damping * boundary.dt)
@@ -195,7 +197,7 @@ def pass_all(nodes, work, boundary, slices, keeps, team):
 def predict_from_places(model, nodes, work, boundary, keeps, team):
     """v* of eq. 3.1 and, where a volume is kept, G of all nodes; returns V [m³], G·v* [m³/s], G·W·G [m⁴/kg].
 
-    `padded_positions` holds the positions. Of the forces only those of held nodes are written out.
+    `padded_positions` holds the positions. Only the forces on held nodes are stored.
     """
     slices = model.slices
     walls = model.membrane.triangles.shape[0] > 0
@@ -211,7 +213,7 @@ def predict_from_places(model, nodes, work, boundary, keeps, team):
 
 @njit_inlined
 def add_up(sums, pieces):
-    """(V, G·v*, G·W·G) from the shares of the slices, in double precision and always in the same order."""
+    """(V, G·v*, G·W·G) from the contributions of the slices, in double precision and always in the same order."""
     volume, flow, mobility = 0.0, 0.0, 0.0
     for s in range(sums.shape[0]):
         volume += sums[s, 0]

@@ -1,17 +1,18 @@
-"""Looking for the few among many: 64 nodes are passed over at once where none of them is meant."""
+"""Search for few nodes among many: a block of 64 nodes without a match is skipped at once."""
 
 from massspring.kernels.jit.decorators import njit_inlined
 from massspring.kernels.jit.flat import flat
 
 BLOCK = 64
-"""Nodes."""
+"""Nodes per block."""
 
 
 @njit_inlined
 def any_gap_within(gap, begin, reach):
-    """Whether any node of the block is no farther than `reach` [m]; a block that is not full is always looked through.
+    """Whether the block from `begin` on has a node with a gap of at most `reach` [m]; always true for a block that is
+    not full.
 
-    What is not a number counts as near.
+    NaN counts as near.
     """
     if begin + BLOCK > gap.shape[0]:
         return True

@@ -1,8 +1,8 @@
-"""Named tuples that compiled code is given by their address.
+"""Named tuples that are passed to compiled code by address.
 
-As a value a tuple of sixty arrays is four hundred numbers of every call that hands it on, and most of the compiler's
-work is to carry them along. An address is one number, and a function reads what it uses. In Python, and where nothing
-is compiled, the tuples are what they were; only compiled code cannot make them.
+Passed by value, a tuple of sixty arrays is four hundred arguments of every call, and takes most of the compile time. An
+address is one number, and a function reads the fields that it uses. In Python, and with the compiler off, the tuples do
+not change; compiled code cannot create them.
 """
 
 import hashlib
@@ -21,18 +21,19 @@ from numba.np.numpy_support import as_dtype
 Tuple = TypeVar("Tuple", bound=type)
 
 WORD = 8
-"""Bytes: of a number, an address, a length."""
+"""Size of a number, an address or a length [bytes]."""
 NUMBERS = {types.float64: -1, types.int64: -2, types.boolean: -3}
-"""How each is read from its Python object; of arrays the size of an item [bytes], positive, says how."""
+"""Code for how a number is read from its Python object; for an array the code is its item size [bytes], which is
+positive."""
 DEPTH = 4
-"""Tuples within tuples at most."""
+"""Deepest nesting of tuples."""
 WHOLE, BYTE, ADDRESS = ir.IntType(64), ir.IntType(8), cgutils.voidptr_t
 
 
 class ByAddress(types.Type):
     """The type of such a tuple: its class and the types of its fields.
 
-    places: where each field begins [bytes], and its type; size: of all fields [bytes]
+    places: offset [bytes] and type of each field; size: of all fields together [bytes]
     """
 
     def __init__(self, tuple_type: type, fields: list[types.Type]) -> None:
@@ -45,8 +46,8 @@ class ByAddress(types.Type):
         super().__init__(f"{tuple_type.__name__}.{hashlib.sha256(words.encode()).hexdigest()[:12]}")
 
     def leaves(self, path: tuple[int, ...] = (), begin: int = 0) -> Iterator[tuple[int, ...]]:
-        """Of each number and array: DEPTH indices that lead to it, -1 for none; where it is to be [bytes]; how it is
-        read."""
+        """For each number and array: DEPTH indices that lead to it, -1 where unused; its offset [bytes]; the code for
+        how it is read."""
         for index, (place, field) in enumerate(self.places.values()):
             here = *path, index
             if isinstance(field, ByAddress):
@@ -117,12 +118,13 @@ def _field(context: Any, builder: Any, group: Any, address: Any, name: str) -> A
 
 
 def _at(builder: Any, address: Any, place: int, kind: Any) -> Any:
-    """Where a value of a kind is, some bytes after an address."""
+    """Pointer to a value of type `kind`, `place` bytes after `address`."""
     return builder.bitcast(builder.gep(address, [WHOLE(place)]), kind.as_pointer())
 
 
 def _read(builder: Any, address: Any, place: int, kind: Any) -> Any:
-    """Nothing changes what is there while compiled code runs: a loop need not read it again after it has written."""
+    """Loads the value, marked as invariant: compiled code never changes a field, so a loop need not read it again after
+    a store."""
     value = builder.load(_at(builder, address, place, kind))
     value.set_metadata("invariant.load", builder.module.add_metadata([]))
     return value
@@ -130,7 +132,7 @@ def _read(builder: Any, address: Any, place: int, kind: Any) -> Any:
 
 @unbox(ByAddress)
 def _gathered(group: Any, value: Any, c: Any) -> NativeValue:
-    """The address of what a Python tuple holds, gathered for the time of a call."""
+    """Address of a buffer with the contents of a Python tuple, valid during a call."""
     builder, kind = c.builder, ir.ArrayType(WHOLE, DEPTH + 2)
     rows = [ir.Constant(kind, [WHOLE(number) for number in row]) for row in group.leaves()]
     table = ir.Constant(ir.ArrayType(kind, len(rows)), rows)
@@ -141,13 +143,14 @@ def _gathered(group: Any, value: Any, c: Any) -> NativeValue:
         c.pyapi.err_set_string(
             "PyExc_TypeError", f"{group.tuple_type.__name__}: an array is not of the type it is meant to be"
         )
-    # Hidden, so that the compiler does not read from there before all is gathered.
+    # Hides the address, so that the compiler does not move reads before the buffer is filled.
     hidden = builder.asm(ir.FunctionType(ADDRESS, [ADDRESS]), "", "=r,0,~{memory}", [room], side_effect=True)
     return NativeValue(hidden, is_error=failed)
 
 
 def _gather(module: Any) -> Any:
-    """The function of a module that gathers: (tuple, leaves, their number, where to) -> whether an array is wrong."""
+    """The LLVM function that fills the buffer: (tuple, leaves, number of leaves, buffer) -> whether an array has the
+    wrong type."""
     flag, real, code = ir.IntType(1), ir.DoubleType(), ir.IntType(32)
     kind = ir.FunctionType(flag, [ADDRESS, ADDRESS, WHOLE, ADDRESS])
     function = cgutils.get_or_insert_function(module, kind, "gather_leaves")

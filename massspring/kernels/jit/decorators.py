@@ -1,4 +1,4 @@
-"""The decorators of all kernels: numba, kept on disk (massspring.compile_parts)."""
+"""Decorators of all kernels: numba with a cache on disk (massspring.compile_parts)."""
 
 from collections.abc import Callable
 from typing import Any, TypeVar
@@ -8,9 +8,9 @@ from massspring.compile_parts import kept_function
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 OPTIONS: dict[str, Any] = {"error_model": "numpy", "nogil": True}
-"""Division follows IEEE: a zero gives inf, and the run has diverged; other threads run meanwhile."""
+"""Division follows IEEE: division by zero gives inf, which ends a run as diverged. Kernels release the GIL."""
 WITHIN: dict[str, Any] = {"_nrt": False, "forceinline": True, "no_cpython_wrapper": True}
-"""Part of the caller, and nothing for Python."""
+"""For a function that is inlined into its callers and cannot be called from Python."""
 
 
 def _jit(function: Function, **options: Any) -> Function:
@@ -23,25 +23,26 @@ def compiled(function: Function) -> Function:
 
 
 def njit_lean(function: Function) -> Function:
-    """As `compiled`, without numba's runtime: what would allocate memory or make an array does not compile.
+    """As `compiled`, without numba's runtime: code that allocates memory or creates an array does not compile.
 
-    No references to arrays are counted.
+    References to arrays are not counted.
     """
     return _jit(function, _nrt=False)
 
 
 def njit_inlined(function: Function) -> Function:
-    """As `njit_lean`, and always part of its caller, which is compiled too: Python cannot call it."""
+    """As `njit_lean`, and always inlined into its compiled callers: Python cannot call it."""
     return _jit(function, **WITHIN)
 
 
 def njit_exposed(function: Function) -> Function:
-    """As `njit_inlined`, for what Python calls as well: a method in Python, a test."""
+    """As `njit_inlined`, for functions that Python calls as well, such as a method or a test."""
     return _jit(function, _nrt=False, forceinline=True)
 
 
 def njit_ignoring_nan(function: Function) -> Function:
-    """As `njit_inlined`, for maxima along arrays: a vector register compares several. NaN makes them anything."""
+    """As `njit_inlined`, for maxima along arrays: a vector register compares several numbers. The result for NaN is
+    undefined."""
     return _jit(function, **WITHIN, fastmath={"nnan", "nsz"})
 
 

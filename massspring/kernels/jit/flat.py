@@ -1,7 +1,7 @@
-"""Rows of a table as one flat array: what loops over all nodes need to become vector instructions.
+"""Rows of a table as one flat array, so that the compiler can vectorise loops over all nodes.
 
-Compilers leave rows of three, and loops that do not begin at 0, one number at a time, three times as slow. NumPy's own
-slice and `reshape` are calls that cost a small body more than its loop; this is an address and a length.
+Compilers do not vectorise loops over rows of three, or loops that do not begin at 0; such loops take three times as
+long. Slicing and `reshape` are calls that cost a small body more than its loop; this view is an address and a length.
 """
 
 from typing import Any
@@ -36,7 +36,7 @@ def _flat(context: Any, builder: Any, signature: Any, args: Any) -> Any:
     source = context.make_array(table)(context, builder, args[0])
     width = cgutils.unpack_tuple(builder, source.shape)[1] if table.ndim == 2 else ir.Constant(word, 1)
     view = context.make_array(signature.return_type)(context, builder)
-    # Without a parent: the view borrows what its caller keeps alive, and no references are counted.
+    # Without a parent: the caller keeps the array alive, and no references are counted.
     populate_array(
         view,
         data=builder.gep(source.data, [builder.mul(first, width)]),

@@ -1,7 +1,7 @@
 """Four numbers of a sparse row's entry at once: sums along a row in one vector register.
 
-The compiler vectorises loops, not the components of an entry, so these sums spell it out. The plain functions say
-what they do and serve where nothing is compiled.
+The compiler vectorises loops, not the components of an entry, so these sums are written as vector instructions. The
+plain functions define the result and are used when nothing is compiled.
 """
 
 from typing import Any
@@ -112,7 +112,7 @@ def _areas(typingctx: Any, start: Any, stop: Any, corner: Any, share: Any, padde
         def step(q: Any, totals: list[Any]) -> list[Any]:
             x = [row.four(4, row.index(2, q, column)) for column in range(4)]
             a, b = builder.fsub(x[2], x[0]), builder.fsub(x[3], x[1])
-            # a × b = (a b' − a' b)', the lanes of ' one further; the outer ' waits for the end.
+            # a × b = (a b' − a' b)', where ' shifts the lanes by one; the outer ' is applied once, after the loop.
             a_next = builder.fmul(row.turned(a, NEXT), b)
             across = builder.fsub(builder.fmul(a, row.turned(b, NEXT)), a_next)
             return [row.plus(totals[0], row.spread(row.number(3, q)), across)]

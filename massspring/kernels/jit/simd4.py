@@ -1,4 +1,4 @@
-"""The code of sums over entries of four numbers: loads, arithmetic and stores of one vector register."""
+"""Code generator for sums over entries of four numbers: loads, arithmetic and stores of one vector register."""
 
 from collections.abc import Callable
 from typing import Any
@@ -13,7 +13,7 @@ NEXT = (1, 2, 0, 3)
 
 
 def _address(builder: Any, kind: Any, array: Any, row: Any) -> Any:
-    """Of the first number in `row`, rows of one or of four numbers."""
+    """Address of the first number in `row`; rows have one or four numbers."""
     width = SIMD_WIDTH if kind.ndim == 2 else 1
     return builder.gep(array.data, [builder.mul(row, ir.Constant(row.type, width))])
 
@@ -35,7 +35,7 @@ def plus(builder: Any, total: Any, a: Any, b: Any) -> Any:
 
 
 class Row:
-    """Writes the code of one sum: loads by row of the arrays among the arguments, arithmetic on four numbers."""
+    """Generates the code of one sum: loads of rows from array arguments, arithmetic on four numbers."""
 
     def __init__(self, context: Any, builder: Any, signature: Any, args: Any, real: Any) -> None:
         self.context, self.builder, self.kinds, self.args = context, builder, signature.args, args
@@ -51,32 +51,32 @@ class Row:
         return _address(self.builder, self.kinds[at], self.arrays[at], row)
 
     def _pointer(self, at: int, row: Any) -> tuple[Any, int]:
-        """To four numbers of the array, and what they are aligned to: one number."""
+        """Pointer to four numbers of an array, and their alignment, that of one number."""
         address = self._where(at, row)
         four = ir.VectorType(address.type.pointee, SIMD_WIDTH).as_pointer()
         return self.builder.bitcast(address, four), self.kinds[at].dtype.bitwidth // 8
 
     def number(self, at: int, row: Any) -> Any:
-        """One number, as real as the sum."""
+        """One number of an array, in the precision of the sum."""
         number = self.builder.load(self._where(at, row))
         return self.context.cast(self.builder, number, self.kinds[at].dtype, self.real)
 
     def given(self, at: int) -> Any:
-        """A number among the arguments, as real as the sum."""
+        """A scalar argument, in the precision of the sum."""
         return self.context.cast(self.builder, self.args[at], self.kinds[at], self.real)
 
     def index(self, at: int, row: Any, column: int = 0) -> Any:
-        """A row number out of an array of uint32."""
+        """A row index from an array of uint32."""
         address = self.builder.gep(self._where(at, row), [ir.Constant(row.type, column)])
         return self.builder.zext(self.builder.load(address), row.type)
 
     def four(self, at: int, row: Any) -> Any:
-        """Four numbers, as real as the array."""
+        """Four numbers in the precision of the array."""
         pointer, align = self._pointer(at, row)
         return self.builder.load(pointer, align=align)
 
     def widened(self, four: Any) -> Any:
-        """Four numbers as real as the sum."""
+        """Four numbers in the precision of the sum."""
         return four if four.type == self.vector else self.builder.fpext(four, self.vector)
 
     def put(self, four: Any, at: int, row: Any) -> None:
@@ -108,14 +108,14 @@ class Row:
         return [builder.load(total) for total in totals]
 
     def sums_by_twos(self, count: int, step: Callable[[Any, list[Any]], list[Any]]) -> list[Any]:
-        """`sums` for rows of many entries, two entries at a time: half as many turns, none waits for the last sum."""
+        """`sums` for rows of many entries, two entries at a time: half as many iterations, and two independent sums."""
         builder, (start, stop) = self.builder, self.args[:2]
         zero, one = ir.Constant(self.vector, [0.0] * SIMD_WIDTH), ir.Constant(start.type, 1)
         even = [cgutils.alloca_once_value(builder, zero) for _ in range(count)]
         odd = [cgutils.alloca_once_value(builder, zero) for _ in range(count)]
         left = builder.and_(builder.sub(stop, start), one)
         with builder.if_then(builder.icmp_signed("<", start, stop)):
-            # The one beyond the pairs is taken as if it were always there: a branch would be guessed wrong.
+            # The last entry of an odd count is computed without a branch, since the processor would mispredict it.
             alone = builder.icmp_signed("==", left, one)
             for total, first in zip(even, step(start, [zero] * count), strict=True):
                 builder.store(builder.select(alone, first, zero), total)

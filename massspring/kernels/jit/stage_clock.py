@@ -1,4 +1,4 @@
-"""A clock inside the frame loop: what each stage of a step costs. Switched off, a stage costs one look at a flag."""
+"""A clock inside the frame loop that times each stage of a step. If it is off, a stage costs one test of a flag."""
 
 from time import perf_counter_ns
 from typing import NamedTuple
@@ -22,7 +22,8 @@ STAGES = (
     "thin probes",
     "integration",
 )
-"""Where one volume is kept by implicit_volume, its gradient is found in the same pass as the springs."""
+"""Stages of a step. If implicit_volume keeps one volume, "springs and prediction" includes the gradient of the
+volume."""
 SPRINGS, HELD, VOLUME, SEARCH, MULTIPLIER, REVISION, PROBES, INTEGRATION, BETWEEN_FRAMES = range(len(STAGES) + 1)
 MONOTONIC = 1
 """The clock's number in POSIX systems (Linux)."""
@@ -39,7 +40,7 @@ class StageTimes(NamedTuple):
     ended: np.ndarray
     """How often each ended, (stages + 1,) int64."""
     on: np.ndarray
-    """Whether anything is measured, (1,) bool."""
+    """Whether the clock is on, (1,) bool."""
 
 
 def new_stage_times(on: bool = True) -> StageTimes:
@@ -49,7 +50,7 @@ def new_stage_times(on: bool = True) -> StageTimes:
 
 
 UNTIMED = new_stage_times(on=False)
-"""Of frames that are not measured."""
+"""Stage times of frames that are not timed."""
 
 
 @intrinsic
@@ -81,7 +82,7 @@ def _compiled_now():
 
 @njit_exposed
 def end_stage(times, stage):
-    """Books the time since the last stage ended on `stage`; nothing where they are off."""
+    """Adds the time since the last stage ended to `stage`, if the clock is on."""
     if times.on[0]:
         time = now()
         times.spent[stage] += time - times.last[0]

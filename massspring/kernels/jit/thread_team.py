@@ -1,7 +1,7 @@
-"""Several threads at one frame: the caller's runs it all, the others wait for parts of its longest loops.
+"""Several threads for one frame: the calling thread runs the frame, the others take parts of its longest loops.
 
-Every number is computed by the same instructions from the same numbers as by one thread, and sums are kept apart by
-slice: results are equal to the last bit. Waiting is by spinning, a step has no time to sleep.
+Every number is computed by the same instructions as with one thread, and each slice is summed separately, so results
+are equal to the last bit. Threads wait by spinning, since a step is too short for sleep.
 """
 
 import os
@@ -17,19 +17,19 @@ from massspring.kernels.jit.by_address import by_address
 from massspring.kernels.jit.decorators import njit_exposed, njit_inlined
 
 LINE = 8
-"""Numbers of a line of the cache: counters in one line would slow each other down."""
+"""Numbers per cache line: counters in the same line would slow each other down."""
 ROUND, DONE, JOB, STEP, READY = (LINE * line for line in range(5))
 JOB_END, JOB_SPRINGS, JOB_SPRINGS_AND_VOLUME, JOB_SEARCH, JOB_MOVE = range(5)
-"""JOB_END ends the frame."""
+"""Jobs of the other threads; JOB_END ends the frame."""
 PATIENCE = 20_000
 """Looks at a counter before the thread offers its core to others: 5 to 10 µs."""
 
 
 @by_address
 class ThreadTeam(NamedTuple):
-    """How T threads share the work: each has the slices and the nodes between two borders of its own.
+    """How T threads share the work: each takes a range of slices and a range of nodes.
 
-    Borders depend on T, sums do not: a slice is always summed by itself, and slices in their order."""
+    The ranges depend on T, the sums do not: each slice is summed separately, and slices are added in order."""
 
     signal: np.ndarray
     """Round number, parts done, job, step, whether all is compiled; one line of the cache each, int64."""
@@ -42,12 +42,12 @@ class ThreadTeam(NamedTuple):
 
 
 def look(signal: np.ndarray, at: int) -> int:
-    """signal[at], and all that its writer wrote before it."""
+    """signal[at], with acquire ordering: everything written before it is visible."""
     return int(signal[at])
 
 
 def raise_by_one(signal: np.ndarray, at: int) -> None:
-    """signal[at] += 1, seen by others after all that was written before."""
+    """signal[at] += 1, with release ordering: other threads see earlier writes first."""
     signal[at] += 1
 
 
@@ -108,7 +108,7 @@ def _compiled_offer():
 
 @njit_inlined
 def wait_until_other_than(signal, at, value):
-    """Waits until signal[at] is not `value`; returns what it is."""
+    """Waits until signal[at] differs from `value`; returns it."""
     looks = 0
     now = look(signal, at)
     while now == value:
@@ -139,7 +139,8 @@ def join(team):
 
 
 def team_of(threads: int, rows: np.ndarray, nodes: int, block: int) -> ThreadTeam:
-    """T threads for slices that begin at `rows` (S + 1,) and for n nodes, as even as whole slices and blocks allow."""
+    """T threads for slices that begin at `rows` (S + 1,) and for n nodes, with shares as equal as whole slices and
+    blocks allow."""
     share = np.arange(threads + 1) / threads
     slices = np.searchsorted(rows, share * rows[-1])
     borders = np.round(share * nodes / block).astype(np.int64) * block

@@ -2,7 +2,7 @@
 """Vector registers as values: the components of several nodes side by side, with +, −, ×, ÷ lane by lane.
 
 The compiler makes vectors of loops over arrays in memory, not of sums that stay in registers over a loop. The plain
-functions say what is meant, with NumPy's arrays for vectors, and serve where nothing is compiled.
+functions define the results, with NumPy arrays as vectors, and are used when nothing is compiled.
 """
 
 import operator
@@ -17,16 +17,16 @@ from numba.core.typing.templates import AbstractTemplate, infer_global, signatur
 from numba.extending import lower_builtin, models, register_model, type_callable
 
 BYTES = 64 if binding.get_host_cpu_features().get("avx512f") else 32
-"""Of a register; results do not depend on it."""
+"""Size of a vector register [bytes]; results do not depend on it."""
 
 
 def lanes_of(table: np.ndarray) -> int:
-    """How many numbers of a table a register holds."""
+    """How many numbers of the type of `table` a register holds."""
     return BYTES // table.itemsize
 
 
 def spread(number: Any, table: np.ndarray) -> Any:
-    """One number, as real as `table`, in all lanes."""
+    """One number in all lanes, in the precision of `table`."""
     return np.full(lanes_of(table), number, dtype=table.dtype)
 
 
@@ -41,7 +41,7 @@ def save(vector: Any, table: np.ndarray, at: int) -> None:
 
 
 def gather(padded: np.ndarray, nodes: np.ndarray, row: int, column: int) -> tuple[Any, Any, Any]:
-    """x, y and z of the nodes of as many lanes as a register holds; `padded` (n, 4), four numbers in one move."""
+    """x, y and z of as many nodes as a register has lanes; `padded` (n, 4), so that one load fetches a node."""
     x, y, z, _ = padded[nodes[row, column : column + lanes_of(padded)]].T
     return x, y, z
 
@@ -52,7 +52,7 @@ def root(vector: Any) -> Any:
 
 
 def at_least(vector: Any, least: Any) -> Any:
-    """The larger of two lanes; what is not a number stays so."""
+    """The larger of each lane and `least`; NaN stays NaN."""
     return np.where(vector < least, least, vector)
 
 
@@ -125,7 +125,7 @@ def _shuffled(builder: Any, a: Any, b: Any, order: list[int]) -> Any:
 
 
 def _address(context: Any, builder: Any, kind: Any, array: Any, indices: list[tuple[Any, Any]]) -> Any:
-    """Where a number of a contiguous table is."""
+    """Address of a number of a contiguous table."""
     table = context.make_array(kind)(context, builder, array)
     at = [context.cast(builder, value, of, types.intp) for value, of in indices]
     if len(at) == 1:
@@ -193,7 +193,8 @@ def _joined(builder: Any, parts: list[Any]) -> Any:
 
 
 def _turned_double(builder: Any, rows: list[Any]) -> list[Any]:
-    """x, y and z of rows (x, y, z, 0): pairs within 128 bits first, then whole pairs, one instruction each."""
+    """x, y and z from rows (x, y, z, 0): first pairs within 128 bits are exchanged, then whole pairs, one instruction
+    each."""
     half, width = len(rows) // 2, len(rows)
     quarters = [_joined(builder, rows[begin : begin + half : 2]) for begin in (0, 1, half, half + 1)]
     fours = range(0, width, 4)
@@ -212,7 +213,7 @@ def _turned_double(builder: Any, rows: list[Any]) -> list[Any]:
 
 
 def _turned_single(builder: Any, rows: list[Any]) -> list[Any]:
-    """The same of single numbers: four rows fill 128 bits each and are turned within them."""
+    """The same in single precision: each row fills 128 bits, and four rows are transposed within them."""
     width = len(rows)
     quarters = [_joined(builder, rows[begin::4]) for begin in range(4)]
 

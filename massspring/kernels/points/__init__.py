@@ -1,1 +1,2 @@
-"""Volumes of quadratic tetrahedra, summed over points inside the elements; their gradients are never assembled."""
+"""Volumes of quadratic tetrahedra, summed over points inside the elements; the matrix of their gradients is never
+assembled."""

@@ -1,4 +1,4 @@
-"""Quadratic tetrahedra side by side in blocks, and the volumes summed over their points, as arrays."""
+"""Quadratic tetrahedra in blocks, and the volumes summed over their points, as arrays."""
 
 from typing import NamedTuple
 
@@ -7,10 +7,10 @@ import numpy as np
 from massspring.kernels.jit.by_address import by_address
 
 BLOCK = 16
-"""Elements side by side: a multiple of what a vector register holds."""
+"""Elements per block: a multiple of the lanes of a vector register."""
 NODES, POINTS, CORNERS = 10, 4, 4
 ROWS, AREAS = 3 * NODES, 9
-"""Of an element: x, y, z of every node; of a point in `area`: x, y, z of three corners."""
+"""Rows of an element: x, y, z of every node; rows of a point in `area`: x, y, z of three corners."""
 SUMS = ROWS + AREAS
 """Row of the first point's sum in the tile."""
 
@@ -24,47 +24,48 @@ class FacetRows(NamedTuple):
     shape: np.ndarray
     """Shape functions at the points, (p, 6)."""
     mass: np.ndarray
-    """What resists a push at a point, 1/Σ_a w_a N_a² [kg], (f, p)."""
+    """Effective mass of a point, 1/Σ_a w_a N_a² [kg], (f, p)."""
     reach: np.ndarray
-    """How far a facet is from its middle at most [m], (f,)."""
+    """Bounding radius of a facet about its middle, with a margin [m], (f,)."""
     near: np.ndarray
     """Scratch: facets that may touch an obstacle in this step, (f,) uint32."""
     contact_id: np.ndarray
     """1 + the obstacle that a point touches, 0 for none, (f, p) int64."""
     pressing: np.ndarray
-    """f [N], (f, p)."""
+    """Normal force f at each point [N], (f, p)."""
     normal: np.ndarray
     """Of the obstacle, towards the body, (f, p, 3)."""
     dragging: np.ndarray
-    """The force along the obstacle [N], (f, p, 3)."""
+    """Friction force, tangential to the obstacle [N], (f, p, 3)."""
     anchor: np.ndarray
-    """Where friction holds a point, seen from the obstacle [m], (f, p, 3)."""
+    """Position at which friction holds a point, relative to the obstacle [m], (f, p, 3)."""
     coupling: np.ndarray
-    """What a force at a point gives the others of its facet, Σ_a w_a N_qa N_pa [1/kg], (f, p, p)."""
+    """Acceleration of point p of a facet per unit of force at point q, Σ_a w_a N_qa N_pa [1/kg], (f, p, p)."""
     candidate: np.ndarray
     """Scratch: 1 + the obstacle that a point may touch in this step, 0 for none, (f, p) int64."""
     slope: np.ndarray
-    """Scratch: the gradient of its gap where the point would end the step, (f, p, 3)."""
+    """Scratch: gradient of the gap at the predicted position of a point, (f, p, 3)."""
     gap: np.ndarray
-    """Scratch: the gap that a point at no speed would end with, less what may be left inside [m], (f, p)."""
+    """Scratch: linearised gap at the end of the step for speed 0, less the part of the penetration that may remain [m],
+    (f, p)."""
     start: np.ndarray
-    """Scratch: where a point is at the start of the step [m], (f, p, 3)."""
+    """Scratch: position of a point at the start of the step [m], (f, p, 3)."""
     last_force: np.ndarray
     """Scratch: the force on a point before it is corrected [N], (f, p, 3)."""
     pressed: np.ndarray
-    """Scratch: whether a facet had a force when it was last looked at, (f,) bool."""
+    """Scratch: whether a facet had a force in its last sweep, (f,) bool."""
     point_speed: np.ndarray
-    """Scratch: of the points of a facet [m/s], (p, 3)."""
+    """Scratch: velocities of the points of a facet [m/s], (p, 3)."""
     change: np.ndarray
-    """Scratch: of the forces on them [N], (p, 3)."""
+    """Scratch: changes of the forces on them [N], (p, 3)."""
 
 
 @by_address
 class PointRows(NamedTuple):
-    """m volumes over b blocks of quadratic tetrahedra, v of vertices and then those inside closed surfaces.
+    """m volumes over b blocks of quadratic tetrahedra: first v of vertices, then those inside closed surfaces.
 
-    Numbers of the elements of a block follow each other in a row. Empty elements repeat the first, and
-    nothing asks for what they give.
+    A row holds one number of each element of a block. Unused places repeat the first element; their results are
+    ignored.
     """
 
     node: np.ndarray
@@ -79,21 +80,21 @@ class PointRows(NamedTuple):
     corner_volume: np.ndarray
     """The volume of each corner, (4 b, BLOCK) uint32."""
     node_start: np.ndarray
-    """Where the entries of each node begin in the next, (n + 1,) uint32."""
+    """First entry of each node in `node_entry`, (n + 1,) uint32."""
     node_entry: np.ndarray
-    """Where its shares begin in `element_push`, seen as flat; y and z are BLOCK and 2 BLOCK further, uint32."""
+    """Flat index in `element_push` of each contribution to a node, uint32; y and z are BLOCK and 2 BLOCK further on."""
     volume_start: np.ndarray
-    """Where the entries of each vertex begin in the next, (v + 1,) uint32."""
+    """First entry of each vertex in `volume_entry`, (v + 1,) uint32."""
     volume_entry: np.ndarray
-    """Where its shares are in `corner_share`, seen as flat, uint32."""
+    """Flat index in `corner_share` of each contribution to a vertex, uint32."""
     closed_triangles: np.ndarray
-    """Of the closed surface kept beside the vertices, (t, 3) uint32; none in a solid body."""
+    """Closed surface whose volume is kept in addition to those of vertices, (t, 3) uint32; empty for a solid body."""
     closed_nodes: np.ndarray
     """Its nodes, (c,) uint32."""
     closed_gradient: np.ndarray
     """dV/dx of its volume [m²], (n, 3)."""
     heavier: np.ndarray
-    """What gravity pulls at beyond the mass that resists motion [kg], (n,)."""
+    """Gravitational mass less inertial mass of each node [kg], (n,)."""
     area: np.ndarray
     """Scratch: w_q cof F_q ∇b_i of three corners [m²], (36 b, BLOCK)."""
     stretch: np.ndarray
@@ -101,23 +102,24 @@ class PointRows(NamedTuple):
     corner_pressure: np.ndarray
     """Scratch: the pressure of each corner's volume [Pa], (4 b, BLOCK)."""
     corner_share: np.ndarray
-    """Scratch: shares of the elements in the volumes of their corners, (4 b, BLOCK)."""
+    """Scratch: contributions of the elements to the volumes of their corners, (4 b, BLOCK)."""
     element_push: np.ndarray
     """Scratch: forces of the elements on their nodes [N], (30 b, BLOCK)."""
     tile: np.ndarray
-    """Scratch: a vector of the nodes of a block, what points share of its slopes, a sum of each, (43, BLOCK)."""
+    """Scratch: a vector at the nodes of a block, the common part of its slopes at the points, a sum for each point,
+    (43, BLOCK)."""
     volume: np.ndarray
     """V_r [m³], (m,)."""
     lam: np.ndarray
-    """Multipliers, on the way in those of the last step [Pa], (m,)."""
+    """Multipliers [Pa], (m,); on entry those of the last step."""
     push: np.ndarray
-    """The force of all volumes and of the points' own pressure on each node [N], (n, 3)."""
+    """The force on each node from all volumes and from the local pressure −b (J_q − 1) at the points [N], (n, 3)."""
     right: np.ndarray
-    """What the multipliers of the moment leave of the right-hand side [m³/s²], (m,)."""
+    """Residual of the right-hand side with the current multipliers [m³/s²], (m,)."""
     diagonal: np.ndarray
     """S_rr at rest without contact [m⁴/kg], (m,); 0 for what nothing can push."""
     inverse: np.ndarray
-    """S⁻¹ at rest, scaled to a diagonal of 1 of S: a preconditioner, (m, m) float32."""
+    """Inverse of S at rest after S is scaled to a diagonal of 1: a preconditioner, (m, m) float32."""
     scale: np.ndarray
     """1/√S_rr [√(kg/m⁴)], 0 for what nothing can push, (m,)."""
     scaled: np.ndarray
@@ -133,6 +135,6 @@ class PointRows(NamedTuple):
     field: np.ndarray
     """Scratch: forces on nodes [N], (n, 3)."""
     moved: np.ndarray
-    """Scratch: what nodes make of forces [m/s²], (n, 3)."""
+    """Scratch: accelerations of the nodes by forces [m/s²], (n, 3)."""
     facets: FacetRows
-    """Where obstacles touch, of no facet where they touch nodes."""
+    """Contact at points of facets; without facets if obstacles touch nodes."""

@@ -1,6 +1,6 @@
 """Sums over the points of quadratic tetrahedra: volumes, their gradients, and products with both.
 
-W_i, A_i and numbers n and o of a point: massspring.kernels.points.slopes.
+massspring.kernels.points.slopes defines W_i, A_i and the numbers n and o of a point.
 """
 
 from massspring.kernels.forces.volume import volume_gradient_into
@@ -44,7 +44,7 @@ def open_point(rows, block, q, between, lane):
 
 @njit_inlined
 def share_among_corners(rows, block, lane):
-    """Σ_q ρ_rq s_q of the corners r, of the numbers s_q in the tile, into `corner_share`."""
+    """Σ_q ρ_rq s_q at each corner r, with the numbers s_q in the tile, into `corner_share`."""
     own, other = spread(rows.own - rows.other, rows.tile), spread(rows.other, rows.tile)
     s0, s1 = load(rows.tile, SUMS, lane), load(rows.tile, SUMS + 1, lane)
     s2, s3 = load(rows.tile, SUMS + 2, lane), load(rows.tile, SUMS + 3, lane)
@@ -58,7 +58,7 @@ def share_among_corners(rows, block, lane):
 
 @njit_inlined
 def add_corners(rows, out):
-    """What the corners of all elements give to the volumes of the vertices, (m,)."""
+    """Sums the contributions of the corners of all elements to the volumes of the vertices into `out` (m,)."""
     share = flat(rows.corner_share, 0, rows.corner_share.shape[0])
     start, entry = rows.volume_start, rows.volume_entry
     for r in range(start.shape[0] - 1):
@@ -104,7 +104,7 @@ def push_block(rows, block, lane, stretched):
 
 @njit_inlined
 def pushes(rows, point, axis, pressure, lane):
-    """p_q A_i of the four corners along an axis; those of a point sum to 0."""
+    """p_q A_i of the four corners along an axis at one point; they sum to 0."""
     first = AREAS * point + axis
     g1, g2 = pressure * load(rows.area, first, lane), pressure * load(rows.area, first + 3, lane)
     g3 = pressure * load(rows.area, first + 6, lane)
@@ -151,7 +151,7 @@ def push_elements(rows, p, stretched):
 
 @njit_inlined
 def push_of(rows, force, p, i):
-    """The force on node i [N], of the elements around it and of the closed surface."""
+    """The force on node i from the elements around it and from the closed surface [N]."""
     f0, f1, f2 = 0.0, 0.0, 0.0
     for k in range(rows.node_start[i], rows.node_start[i + 1]):
         at = rows.node_entry[k]

@@ -11,20 +11,21 @@ from massspring.kernels.jit.decorators import njit_inlined, njit_lean
 from massspring.kernels.points.facets import LEFT, add_at_point, at_point, begin_touch, force_at, forget, list_near
 
 SWEEPS = 40
-"""At most."""
+"""Most sweeps per step."""
 RELAXATION = 1.5
-"""Of a correction (successive over-relaxation): a quarter fewer sweeps than 1."""
+"""Factor on each correction (successive over-relaxation); it takes a quarter fewer sweeps than 1."""
 NEARLY = 1.0 - 1e-9
-"""Of the square of a force that was cut to its limit: round-off."""
+"""Share of the squared friction limit from which on a force counts as being at the limit: allows for round-off."""
 SETTLED = 1e-4
-"""Change of the forces in a sweep, over the largest, at which they stand: 1e-3 would shake a body at rest."""
+"""Largest change of a force in a sweep, over the largest force, at which the sweeps end; 1e-3 would shake a body at
+rest."""
 
 
 @njit_inlined
 def rub(facets, f, q, k, most, slip):
-    """Moves the force along the obstacle [N] towards where friction holds the point: Coulomb's, at most `most`.
+    """Corrects the friction force so that it pulls the point towards its anchor; Coulomb's law limits it to `most` [N].
 
-    `k` [N/m] takes back a whole way within the step; `slip` (3) [m]: the way to take back.
+    `slip` (3,) [m]: the displacement to undo; a stiffness of `k` [N/m] undoes all of it within the step.
     """
     drag, normal = facets.dragging, facets.normal
     t0, t1, t2 = drag[f, q, 0] - k * slip[0], drag[f, q, 1] - k * slip[1], drag[f, q, 2] - k * slip[2]
@@ -39,7 +40,8 @@ def rub(facets, f, q, k, most, slip):
 
 @njit_inlined
 def slides(facets, boundary, o, f, q):
-    """Whether the force along obstacle o is all that friction gives: the point is held where the step ends."""
+    """Whether the friction force is at its limit, so that the point slides and its anchor moves to where the step
+    ends."""
     if not boundary.friction[o] > 0.0:
         return False
     drag, most = facets.dragging, boundary.friction[o] * facets.pressing[f, q]
@@ -49,7 +51,8 @@ def slides(facets, boundary, o, f, q):
 
 @njit_inlined
 def press(facets, boundary, step, f, q):
-    """Corrects the force on point q of facet f, of speed `point_speed`, so that it ends the step outside."""
+    """Corrects the force on point q of facet f so that the point, with velocity `point_speed`, ends the step
+    outside."""
     u, dt, o = facets.point_speed, boundary.dt, facets.candidate[f, q] - 1
     slope = facets.slope
     gap = facets.gap[f, q] + dt * (slope[f, q, 0] * u[q, 0] + slope[f, q, 1] * u[q, 1] + slope[f, q, 2] * u[q, 2])
@@ -77,8 +80,8 @@ def press(facets, boundary, step, f, q):
 
 @njit_inlined
 def settle_points(facets, boundary, step, f):
-    """`press` for all points of facet f in turns, their changes into `change` (p, 3) [N]; the largest of them, and of
-    the forces."""
+    """Applies `press` to the points of facet f in turn; their changes of force go into `change` (p, 3) [N]. Returns the
+    largest change and the largest force [N]."""
     dt, u, change, points = boundary.dt, facets.point_speed, facets.change, facets.shape.shape[0]
     changed, largest = 0.0, 0.0
     for q in range(points):
@@ -101,7 +104,7 @@ def settle_points(facets, boundary, step, f):
 
 @njit_inlined
 def open_facet(facets, speed, f):
-    """The speeds of the points of facet f [m/s], and no changes."""
+    """Sets `point_speed` of the points of facet f [m/s], and their changes to 0."""
     u, change = facets.point_speed, facets.change
     for q in range(facets.shape.shape[0]):
         u[q, 0], u[q, 1], u[q, 2] = at_point(speed, facets.node, facets.shape[q], f)
@@ -110,7 +113,7 @@ def open_facet(facets, speed, f):
 
 @njit_inlined
 def tell_nodes(facets, speed, inverse_mass, dt, f):
-    """What the changes of the forces on facet f make of the speeds of its nodes [m/s]."""
+    """Adds the effect of the changes of force on facet f to the velocities `speed` of its nodes [m/s]."""
     change = facets.change
     for a in range(6):
         i, d0, d1, d2 = facets.node[f, a], 0.0, 0.0, 0.0
@@ -123,7 +126,8 @@ def tell_nodes(facets, speed, inverse_mass, dt, f):
 
 @njit_inlined
 def give_back(facets, speed, inverse_mass, dt, count):
-    """Takes back the known forces of points that touch another obstacle now, of the first `count` facets in `near`."""
+    """For the first `count` facets in `near`, removes from `speed` the previous forces at points that have left their
+    obstacle."""
     for k in range(count):
         f = facets.near[k]
         for q in range(facets.shape.shape[0]):
@@ -135,7 +139,7 @@ def give_back(facets, speed, inverse_mass, dt, count):
 
 @njit_inlined
 def book(facets, boundary, step, speed, contact_impulse, f, q):
-    """The impulse on point q of facet f, and where friction holds it from now on."""
+    """Adds the impulse on point q of facet f to its obstacle, and moves the anchor of a point that slides."""
     dt, o = boundary.dt, facets.contact_id[f, q] - 1
     f0, f1, f2 = force_at(facets, f, q)
     contact_impulse[o, 0] += dt * f0
@@ -151,8 +155,8 @@ def book(facets, boundary, step, speed, contact_impulse, f, q):
 
 @njit_inlined
 def sweep(facets, boundary, step, speed, inverse_mass, count, pressed_only):
-    """Once over the first `count` facets in `near`, or over those of them with a force; the largest change of a force,
-    and the largest force [N]."""
+    """One sweep over the first `count` facets in `near`, or only over those with a force. Returns the largest change of
+    a force and the largest force [N]."""
     changed, largest = 0.0, 0.0
     for k in range(count):
         f = facets.near[k]
@@ -169,7 +173,7 @@ def sweep(facets, boundary, step, speed, inverse_mass, count, pressed_only):
 
 @njit_inlined
 def sweep_until_settled(facets, boundary, step, speed, inverse_mass, count):
-    """Over all facets first and at the end, between over those with a force."""
+    """The first and the last sweeps go over all facets, those between over facets with a force."""
     for number in range(SWEEPS):
         among_pressed = number > 0 and number + 1 < SWEEPS
         changed, largest = sweep(facets, boundary, step, speed, inverse_mass, count, among_pressed)
@@ -183,9 +187,11 @@ def sweep_until_settled(facets, boundary, step, speed, inverse_mass, count):
 
 @njit_lean
 def corrections_into(nodes, facets, boundary, step, speed, field, inverse_mass, contact_impulse):
-    """What changes of the forces of all points [N], into `field` (n, 3); books the impulses of the obstacles.
+    """The changes of the forces at all points, as nodal forces [N], into `field` (n, 3). Adds the impulses of the
+    obstacles.
 
-    `speed` (n, 4): of nodes under the forces that were known [m/s]; a correction moves it for the facets that follow.
+    `speed` (n, 4): velocities of the nodes under the forces of the last step [m/s]; each correction updates it for the
+    following facets.
     """
     field[:] = 0.0
     count, lost = list_near(facets, nodes, boundary, step, speed)

@@ -1,7 +1,8 @@
-"""Points inside quadratic facets and the obstacles they touch: which may touch in a step, where, and with which force.
+"""Contact of points inside quadratic facets with obstacles: which points may touch in a step, where, and with which
+force.
 
-At a corner of a quadratic facet a uniform pressure leaves no force, so that nodes alone meet an obstacle unevenly. Here
-the force acts where the facet is (theory, eq. 9.3–9.5); `facet_forces` finds it.
+A uniform pressure on a quadratic facet gives no force at its corners, so contact at nodes alone is uneven. Here forces
+act at points inside the facet (theory, eq. 9.3–9.5); `facet_forces` computes them.
 """
 
 import math
@@ -10,8 +11,8 @@ from massspring.kernels.contact.gaps import gap_and_normal
 from massspring.kernels.jit.decorators import njit_inlined, njit_lean
 
 LEFT = 0.95
-"""Of what is inside, or has slipped, at the start of a step that may be so at its end: pressures answer a step later,
-and to push all of it out at once would shake the body (eq. 9.7)."""
+"""Share of a penetration or slip at the start of a step that may remain at its end. Pressures respond one step later,
+so a full correction at once would shake the body (eq. 9.7)."""
 
 
 @njit_inlined
@@ -40,7 +41,7 @@ def is_far(facets, nodes, boundary, step, f):
 
 @njit_inlined
 def deepest(boundary, step, y):
-    """The obstacle that the point y is deepest in, its gap [m], and the gradient of that gap."""
+    """The obstacle with the smallest gap at the point y, that gap [m], and its gradient."""
     best, least, n0, n1, n2 = 0, math.inf, 0.0, 0.0, 0.0
     for o in range(boundary.radius.shape[0]):
         place = boundary.position[step, o]
@@ -52,7 +53,7 @@ def deepest(boundary, step, y):
 
 @njit_inlined
 def forget(facets, f, q):
-    """Nothing is touched at point q."""
+    """Ends the contact at point q of facet f and clears its forces."""
     facets.contact_id[f, q], facets.pressing[f, q] = 0, 0.0
     for axis in range(3):
         facets.dragging[f, q, axis] = 0.0
@@ -71,9 +72,9 @@ def force_at(facets, f, q):
 
 @njit_inlined
 def face(facets, boundary, step, y, o, place):
-    """The normal of obstacle o, where point `place` (f, q) at y [m] is now; along that of the prediction a round
-    obstacle would do work on what slides over it. Returns the gap at the start of the step where it is inside, else
-    0 [m]."""
+    """Sets the normal of point `place` (f, q) to that of obstacle o at y [m], the position at the start of the step.
+    With the predicted position a round obstacle would do work on a point that slides. Returns the gap at the start of
+    the step if it is negative, else 0 [m]."""
     f, q = place
     centre, v, dt = boundary.position[step, o], boundary.velocity[step, o], boundary.dt
     r0, r1, r2 = y[0] - centre[0], y[1] - centre[1], y[2] - centre[2]
@@ -94,7 +95,7 @@ def begin_touch(facets, boundary, step, y, o, place):
 
 @njit_inlined
 def add_at_point(facets, field, force, f, q):
-    """A force (3) [N] at point q of facet f: what its nodes have of it, into `field` (n, 3)."""
+    """Distributes a force (3,) [N] at point q of facet f to its nodes, into `field` (n, 3)."""
     for a in range(6):
         i, share = facets.node[f, a], facets.shape[q, a]
         for axis in range(3):
@@ -103,7 +104,8 @@ def add_at_point(facets, field, force, f, q):
 
 @njit_lean
 def last_forces_into(nodes, facets, boundary, step, field):
-    """What all points had in the last step [N], along the normals of now, into `field` (n, 3)."""
+    """The contact forces of the last step at all points, along the current normals, as nodal forces [N] into `field`
+    (n, 3)."""
     field[:] = 0.0
     for f in range(facets.node.shape[0]):
         for q in range(facets.shape.shape[0]):
@@ -115,10 +117,11 @@ def last_forces_into(nodes, facets, boundary, step, field):
 
 @njit_inlined
 def prepare_point(facets, boundary, step, state, f, q):
-    """What the step would end with at point q of facet f: `state`, its position and its speed under the known forces.
+    """Prepares the contact of point q of facet f; `state` is its position and its velocity under the forces of the last
+    step.
 
-    The gap is linear in the speed from there on. Returns whether the point touched another obstacle until now, whose
-    force is gone.
+    From here on the gap is linear in the velocity. Returns whether the point has lost contact with another obstacle
+    that pressed on it.
     """
     y, u = state
     dt, left = boundary.dt, False
@@ -141,8 +144,8 @@ def prepare_point(facets, boundary, step, state, f, q):
 
 @njit_inlined
 def list_near(facets, nodes, boundary, step, speed):
-    """How many facets touch an obstacle or may come to do so in this step, listed in `near` and prepared; the last of
-    them that lost a contact, or −1."""
+    """Lists in `near`, and prepares, the facets that touch an obstacle or may touch one in this step. Returns their
+    number, and the last facet that lost a contact, or −1."""
     count, lost = 0, -1
     for f in range(facets.node.shape[0]):
         near = not is_far(facets, nodes, boundary, step, f)

@@ -1,8 +1,8 @@
-"""Slopes of vectors at the points of quadratic tetrahedra: of positions, velocities, whatever nodes have.
+"""Slopes of nodal vectors, such as positions or velocities, at the points of quadratic tetrahedra.
 
-A vector register holds the same number of several elements. b_i are the linear shape functions of the corners; at a
-point n is that of the nearest corner, o that of the others. F_q = Σ_i W_i ⊗ ∇b_i over three corners, with
-W_i = ∂x/∂b_i − ∂x/∂b_0, so w_q J_q = det W / 24 and w_q cof F_q ∇b_i = W_j × W_k / 24: no slope at rest is needed.
+A vector register holds the same number of several elements. b_i are the linear shape functions of the corners. At a
+point n is the value of b_i for the nearest corner, o for the other corners. F_q = Σ_i W_i ⊗ ∇b_i over three corners,
+with W_i = ∂x/∂b_i − ∂x/∂b_0, so w_q J_q = det W / 24 and w_q cof F_q ∇b_i = W_j × W_k / 24: no slope at rest is needed.
 """
 
 from massspring.kernels.jit.decorators import njit_inlined
@@ -11,7 +11,8 @@ from massspring.kernels.jit.vectors import gather, lanes_of, load, save, spread
 from massspring.kernels.points.arrays import BLOCK, NODES, ROWS
 
 AT_0, AT_1, AT_2, AT_3 = (0, 4, 6, 7), (4, 1, 5, 8), (6, 5, 2, 9), (7, 8, 9, 3)
-"""Of the point near each corner: the nodes between that corner and the four, itself among them."""
+"""For the point near each corner: that corner, and the mid-side nodes between it and the other three, in the order of
+the corners."""
 
 
 @njit_inlined
@@ -22,7 +23,7 @@ def blocks_of(rows):
 
 @njit_inlined
 def gather_block(rows, vector, block):
-    """What `vector` (n, 4) is at the nodes of a block, x, y, z of each, into the tile."""
+    """Copies x, y, z of `vector` (n, 4) at the nodes of a block into the tile."""
     tile = flat(rows.tile, 0, rows.tile.shape[0])
     for a in range(NODES):
         for lane in range(0, BLOCK, lanes_of(vector)):
@@ -35,7 +36,7 @@ def gather_block(rows, vector, block):
 
 @njit_inlined
 def load_three(table, row, lane):
-    """x, y and z from rows that follow each other."""
+    """x, y and z from three consecutive rows."""
     return load(table, row, lane), load(table, row + 1, lane), load(table, row + 2, lane)
 
 
@@ -47,8 +48,8 @@ def times(vector, factor):
 
 @njit_inlined
 def open_block(rows, lane):
-    """B_i = (4 o − 1)(x_i − x_0) + 4 o Σ_j (x_ij − x_0j), of the tile's vector x at the corners and between them: what
-    all points share of ∂x/∂b_i − ∂x/∂b_0 (eq. 8.9)."""
+    """B_i = (4 o − 1)(x_i − x_0) + 4 o Σ_j (x_ij − x_0j), from the tile's vector x at corners and mid-sides: the part
+    of ∂x/∂b_i − ∂x/∂b_0 common to all points (eq. 8.9)."""
     corner, side = spread(4.0 * rows.other - 1.0, rows.tile), spread(4.0 * rows.other, rows.tile)
     x, tile = rows.tile, flat(rows.tile, 0, rows.tile.shape[0])
     for axis in range(3):
@@ -78,7 +79,7 @@ def slopes(rows, between, lane):
 
 @njit_inlined
 def save_three(vector, table, at):
-    """x, y and z into rows that follow each other."""
+    """Stores x, y and z in three consecutive rows."""
     save(vector[0], table, at)
     save(vector[1], table, at + BLOCK)
     save(vector[2], table, at + 2 * BLOCK)

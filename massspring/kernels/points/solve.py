@@ -16,7 +16,7 @@ from massspring.kernels.points.elements import push_elements, push_of, times_int
 
 @compiled
 def weigh_into(model, nodes, rows, boundary):
-    """Gravity on mass that does not resist motion: v* of free nodes, the force that attachments take of held ones."""
+    """Adds gravity on the mass that `mass` lacks: to v* of free nodes, and to the force on held ones."""
     for i in range(rows.heavier.shape[0]):
         push = boundary.dt * model.inverse_mass[i] * rows.heavier[i]
         for axis in range(3):
@@ -29,7 +29,7 @@ def weigh_into(model, nodes, rows, boundary):
 
 @njit_inlined
 def respond(model, force, implicit, moved):
-    """W f [m/s per s] into `moved` (n, 3): of each node alone, or of the matrix of springs taken implicitly."""
+    """W f [m/s²] into `moved` (n, 3): node by node, or with the inverse of the matrix of implicit springs."""
     if implicit is None:
         for i in range(force.shape[0]):
             w = model.inverse_mass[i]
@@ -57,7 +57,7 @@ def pushed_velocity_into(model, nodes, contacts, rows, implicit, dt):
 def set_right_side(frame, rows, implicit, target, tolerance, pairs=None):
     """rhs_r = (V0_r − V_r)/dt² − (J u)_r/dt [m³/s²], errors capped by the bound of eq. 8.5, u = ṽ + dt W̃ F.
 
-    Returns whether a volume was capped, and whether a wrong one had nothing to push on.
+    Returns whether an error was capped, and whether a volume with an error had no gradient.
     """
     model, dt = frame.model, frame.boundary.dt
     pushed_velocity_into(model, frame.nodes, frame.contacts, rows, implicit, dt)
@@ -80,8 +80,8 @@ def set_right_side(frame, rows, implicit, target, tolerance, pairs=None):
 
 @njit_lean
 def apply_schur(frame, rows, implicit, p, product, pairs=None):
-    """S p = J (W̃ (Jᵀ p)), (m,): no motion of a held node, none into an obstacle (eq. 3.4, 8.3) or, of faces of a cut
-    that touch, into each other (eq. 9.10)."""
+    """S p = J (W̃ (Jᵀ p)), (m,). Held nodes do not move, no node moves into an obstacle (eq. 3.4, 8.3), and touching
+    faces of a cut do not move into each other (eq. 9.10)."""
     push_elements(rows, p, False)
     force, u, contacts = flat(rows.element_push, 0, rows.element_push.shape[0]), rows.node_vector, frame.contacts
     field, moved = rows.field, rows.moved
@@ -100,7 +100,8 @@ def apply_schur(frame, rows, implicit, p, product, pairs=None):
 
 @njit_lean
 def add_response(model, nodes, rows, implicit, dt):
-    """v* += dt W f for the forces in `rows.field` [N], booked at held nodes (eq. 3.1, 3.6)."""
+    """v* += dt W f for the forces in `rows.field` [N], which are also added to the force on held nodes (eq. 3.1,
+    3.6)."""
     respond(model, rows.field, implicit, rows.moved)
     for i in range(rows.moved.shape[0]):
         for axis in range(3):
@@ -122,7 +123,7 @@ def product_of(row, vector):
 
 @njit_exposed
 def precondition_into(rows, residual, product):
-    """z = S⁻¹ residual with S at rest, which turning the body leaves as it is; returns residual · z."""
+    """z = S⁻¹ residual with S at rest, which does not depend on the rotation of the body; returns residual · z."""
     scale, scaled, rho = rows.scale, rows.scaled, 0.0
     for r in range(scale.shape[0]):
         scaled[r] = scale[r] * residual[r]
@@ -137,7 +138,7 @@ def solve_iteratively(frame, rows, implicit, most, pairs=None):
     """lam += S⁻¹ rhs by conjugate gradients (eq. 8.4).
 
     Ends when |rhs − S Δlam|_r ≤ allowed_r for every volume, or after `most` iterations; returns their number. A volume
-    without a diagonal has nothing to push on and is left out.
+    with a diagonal of 0 cannot be corrected and is left out.
     """
     residual, search, image, allowed = rows.right, rows.search, rows.image, rows.allowed
     for r in range(search.shape[0]):

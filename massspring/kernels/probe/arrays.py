@@ -1,6 +1,7 @@
-"""What the stage for thin probes is given: p probes, f triangles, n nodes, m volumes, r rows at most.
+"""Arrays of the stage for thin probes: p probes, f triangles, n nodes, m volumes, at most r rows.
 
-Triangles are numbered along a curve through the body (`Probing.surface`), so that a block of them lies together.
+Triangles are numbered along a space-filling curve (`Probing.surface`), so that the triangles of a block are close
+together.
 """
 
 from typing import NamedTuple
@@ -21,13 +22,13 @@ COUNTS = (
     "pairs tested",
     "nodes carried",
 )
-"""What `Probing.counts` counts."""
+"""Names of the columns of `Probing.counts`."""
 IN_CONTACT, SEARCH_ROUNDS, CARRYING, LEFT_BEHIND, COMPARED, TESTED, CARRIED = range(len(COUNTS))
 
 
 @by_address
 class Rows(NamedTuple):
-    """Point contacts of the step: row k presses nodes of one triangle along one direction, with an impulse >= 0."""
+    """Point contacts of the step: row k pushes the nodes of one triangle along one direction, with an impulse >= 0."""
 
     count: np.ndarray
     """Rows in use, (1,) int64."""
@@ -46,11 +47,11 @@ class Rows(NamedTuple):
     flow: np.ndarray
     """g_k = Σ_i b_i J_i W̃_i n [m²/kg], how the volumes change with the impulse, (r, m)."""
     answer: np.ndarray
-    """S⁻¹ g_k [1/m²], the pressures that undo it, (r, m)."""
+    """S⁻¹ g_k [1/m²], the pressures that undo this change, (r, m)."""
     matrix: np.ndarray
     """A [1/kg], (r, r)."""
     right: np.ndarray
-    """What the rows ask for beyond the motion without them [m/s], (r,)."""
+    """Velocity that each row requires beyond the motion without contacts [m/s], (r,)."""
     impulse: np.ndarray
     """c >= 0 [N s], (r,)."""
     active: np.ndarray
@@ -63,38 +64,38 @@ class Rows(NamedTuple):
 
 @by_address
 class Probing(NamedTuple):
-    """Thin probes and a surface: sleeping pairs, the pairs of the step, its contacts."""
+    """Thin probes and a surface: sleeping pairs, near pairs of the step, and contacts."""
 
     radius: np.ndarray
-    """How far a surface stays from each tip [m], (p,); positive also where the probe has no thickness."""
+    """Distance that the surface keeps from each tip [m], (p,); positive even for a probe without thickness."""
     skipping: bool
-    """Whether pairs sleep and boxes are compared; the answer is the same without, bit for bit."""
+    """Whether sleeping pairs and boxes are used to skip triangles; the result is the same bit for bit without."""
     travel: np.ndarray
-    """How far any node can have come nearer to any tip since the start [m], (1,)."""
+    """Upper bound on how much nearer any node has come to any tip since the start [m], (1,)."""
     surface: np.ndarray
-    """The triangles along the curve, (f, 3) uint32."""
+    """Triangles in the order of the curve, (f, 3) uint32."""
     number: np.ndarray
-    """What the body calls them, (f,) uint32."""
+    """Number of each triangle in the body, (f,) uint32."""
     wake: np.ndarray
-    """Travel at which the next triangle of a block must be looked at again [m], (p, ceil(f / TRIANGLE_BLOCK))."""
+    """Travel at which a block of triangles must be checked again [m], (p, ceil(f / TRIANGLE_BLOCK))."""
     near: np.ndarray
     """Triangles that may meet a tip in this step, ascending, (p, f) uint32."""
     near_count: np.ndarray
     """(p,) int64."""
     time: np.ndarray
-    """When a tip passes through each near triangle, 0 … 1 of the step, or more, (f,)."""
+    """Time at which a tip passes through each near triangle, 0 … 1 of the step; larger if it does not, (f,)."""
     passing: np.ndarray
     """Weights and direction of each passing, (f, 6)."""
     rows: Rows
     base: np.ndarray
-    """u_i, what a node does without contact [m/s], (n, 3); of corners of near triangles."""
+    """u_i, velocity without contact of the corners of near triangles [m/s], (n, 3)."""
     push: np.ndarray
-    """Σ_k b_ki c_k W̃_i n_k, what the contacts add, or how much faster than its tip a carried node goes [m/s], (n, 3);
-    zero between steps."""
+    """Σ_k b_ki c_k W̃_i n_k, the velocity that contacts add; of a carried node its velocity relative to the tip [m/s],
+    (n, 3); zero between steps."""
     velocity: np.ndarray
-    """v⁺_i as the step stands [m/s], (n, 3)."""
+    """v⁺_i with the current contacts [m/s], (n, 3)."""
     change: np.ndarray
-    """δ, of the pressures of the kept volumes [Pa], (m,)."""
+    """δ, change of the pressures of the kept volumes [Pa], (m,)."""
     carried: np.ndarray
     """1 + the probe that takes a node along, 0 for none, (n,) uint32; zero between steps."""
     taken: np.ndarray
@@ -105,13 +106,13 @@ class Probing(NamedTuple):
     """1 + the body's number of the first triangle that a tip was driven through, 0 for none, (p,) int64."""
     pair: Pair
     diagnostics: FrameDiagnostics
-    """Of the frame."""
+    """Diagnostics of the frame."""
     counts: np.ndarray
     """COUNTS since the start, (7,) int64."""
 
 
 class Stage(NamedTuple):
-    """One step as the functions of this stage see it."""
+    """Data of one step for the functions of this stage."""
 
     model: Model
     nodes: Nodes

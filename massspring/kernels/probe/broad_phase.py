@@ -9,16 +9,16 @@ from massspring.kernels.jit.flat import flat
 from massspring.kernels.probe.arrays import COMPARED
 
 TRIANGLE_BLOCK = 8
-"""Triangles that share one alarm: 39,000 triangles are 4,880 numbers a step while all sleep."""
+"""Triangles per sleeping block: 39,000 triangles take 4,880 comparisons per step while all sleep."""
 ROOM = 3.0
-"""How much farther pairs are looked for than the motion without contact goes: pushes add to it."""
+"""Factor on the motion without contact within which pairs are searched: pushes add to the motion."""
 SAFE = 1.0 + 1e-6
-"""Sums of distances over a million steps lose less than this, speeds in single precision too."""
+"""Factor on distances: sums over a million steps, and velocities in single precision, lose less than this."""
 
 
 @njit_ignoring_nan
 def fastest_free(v_star, direction, inverse_mass, impulse):
-    """max_i |v*_i + impulse w_i d_i|² [m²/s²] of flat tables, as if no node were held (eq. 3.5)."""
+    """max_i |v*_i + impulse w_i d_i|² [m²/s²] of flat tables, without contact (eq. 3.5)."""
     fastest = v_star.dtype.type(0)
     for i in range(inverse_mass.shape[0]):
         w = impulse * inverse_mass[i]
@@ -31,7 +31,7 @@ def fastest_free(v_star, direction, inverse_mass, impulse):
 
 @njit_lean
 def fastest_node(model, nodes, contacts, push, dt):
-    """At least |v⁺_i| [m/s] of every node in the step as it stands, without thin probes (eq. 3.5)."""
+    """Upper bound on |v⁺_i| [m/s] over all nodes, without thin probes (eq. 3.5)."""
     n, mode, real = model.inverse_mass.shape[0], contacts.mode, nodes.x.dtype.type
     v_star, direction = flat(nodes.v_star, 0, n), flat(push.direction, 0, n)
     weight = flat(model.inverse_mass, 0, n)
@@ -58,10 +58,10 @@ def box_gap(x, triangles, f, p0, p1, p2):
 
 @njit_lean
 def find_near(nodes, tips, step, probes, reach):
-    """Fills `near` with the triangles whose box may come within the radius of a tip in `reach` [m] of motion
-    (eq. 11.5).
+    """Fills `near` with the triangles whose box may come within the radius of a tip if it moves by `reach` [m] (eq.
+    11.5).
 
-    A block whose nearest triangle is g away sleeps until the travel has grown by g: none of its boxes is looked at.
+    A block whose nearest triangle is at distance g sleeps until the travel has grown by g; its boxes are not checked.
     """
     surface, reach = probes.surface, SAFE * reach
     for p in range(probes.radius.shape[0]):

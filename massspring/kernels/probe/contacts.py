@@ -1,6 +1,7 @@
-"""Contacts of points with triangles beside a volume: few rows, one small dense solve (docs/theory.md, section 11).
+"""Contacts of points with triangles of a body whose volume is kept: one small dense system (docs/theory.md, section
+11).
 
-A contact at the weights b of a triangle couples its three nodes. With u the motion of the step without any,
+A contact at the weights b of a triangle couples its three nodes. With u the velocity without these contacts,
 
     v⁺_i = u_i + W̃_i (Σ_k b_ki n_k c_k + dt δ G_i),  n_k·(Σ_i b_ki x⁺_i − tip⁺) ≥ radius,  c_k ≥ 0,
     Σ G_i·(v⁺_i − u_i) = 0.
@@ -15,18 +16,19 @@ from massspring.kernels.jit.decorators import njit_lean
 from massspring.kernels.probe.pressure import answer_into, change_of_rows, flow_into
 
 RIGID = 1e-10
-"""Added share of A's diagonal: two contacts on one edge are one, and the weaker of them goes."""
+"""Relative addition to the diagonal of A: of two contacts on one edge, which are the same condition, the weaker is
+dropped."""
 IDLE = 1e-9
-"""Share of the diagonal without the volume below which a contact has nothing to move."""
+"""Share of the diagonal without the volume term below which a contact has nothing to move."""
 SWAPS = 8
-"""Changes of the set that presses, times the number of rows; two are the rule."""
+"""Most changes of the pressing set, per row; two are usual."""
 SLACK = 1e-9
-"""Share of the largest right side by which a contact that does not press may be missed: round-off."""
+"""Violation allowed for a contact that does not press, over the largest right side: round-off."""
 
 
 @njit_lean
 def row_of(rows, p, f):
-    """The row of a probe and a triangle, or the number of rows."""
+    """Index of the row of a probe and a triangle; the number of rows if there is none."""
     count = rows.count[0]
     for k in range(count):
         if rows.probe[k] == p and rows.triangle[k] == f:
@@ -36,7 +38,7 @@ def row_of(rows, p, f):
 
 @njit_lean
 def set_row(rows, p, f, triangles, pair):
-    """Makes what `pair` has found of probe p and triangle f their row; whether there is room for it."""
+    """Stores the contact in `pair` as the row of probe p and triangle f. Returns whether there is room for it."""
     k = row_of(rows, p, f)
     if k == rows.triangle.shape[0]:
         return False
@@ -91,7 +93,7 @@ def matrix_into(rows):
             for r in range(rows.flow.shape[1]):
                 value -= rows.flow[k, r] * rows.answer[j, r]
             if k == j:
-                # Where all else is held the volume may leave a triangle nowhere to go.
+                # If all other nodes are held, the volume constraint may leave a triangle no motion.
                 value = max(value, IDLE * shared) * (1.0 + RIGID)
             rows.matrix[k, j], rows.matrix[j, k] = value, value
 
@@ -120,7 +122,7 @@ def press(rows):
 
 @njit_lean
 def choose_rows(rows):
-    """c ≥ 0, A c ≥ right, and one of them equal in every row: a contact that would pull is left (eq. 11.6)."""
+    """Solves c ≥ 0, A c ≥ right, with equality in one of the two in every row, so that no contact pulls (eq. 11.6)."""
     n = rows.count[0]
     largest = 0.0
     for k in range(n):
@@ -149,7 +151,7 @@ def choose_rows(rows):
 
 @njit_lean
 def spread_push(rows, push, inverse_mass):
-    """push_i = Σ_k b_ki c_k W̃_i n_k [m/s] of the corners of all rows; the largest bound w Σ b c on it [m/s]."""
+    """push_i = Σ_k b_ki c_k W̃_i n_k [m/s] of the corners of all rows. Returns an upper bound on it, Σ w b c [m/s]."""
     clear_push(rows, push)
     fastest = 0.0
     for k in range(rows.count[0]):
@@ -163,7 +165,7 @@ def spread_push(rows, push, inverse_mass):
 
 @njit_lean
 def clear_push(rows, push):
-    """Takes the pushes of all rows away."""
+    """Sets the pushes of all rows to 0."""
     for k in range(rows.count[0]):
         for q in range(3):
             for axis in range(3):
@@ -172,8 +174,8 @@ def clear_push(rows, push):
 
 @njit_lean
 def solve_rows(stage, volumes):
-    """Impulses of all rows and the change of pressures beside them; how much faster they make a node at most [m/s]
-    (eq. 11.6)."""
+    """Computes the impulses of all rows and the change of pressures. Returns a bound on the velocity that they add to a
+    node [m/s] (eq. 11.6)."""
     rows = stage.probes.rows
     aim_rows(stage)
     for k in range(rows.count[0]):

@@ -1,6 +1,6 @@
-"""A moving point and a moving triangle: when they meet, and where (docs/theory.md, section 11).
+"""When and where a moving point and a moving triangle meet (docs/theory.md, section 11).
 
-All corners are given as seen from the point, so the point rests at the origin and a pair is two arrays (3, 3).
+All corners are relative to the point, so the point rests at the origin and a pair is two arrays (3, 3).
 """
 
 import math
@@ -15,14 +15,14 @@ from massspring.kernels.jit.decorators import njit_lean
 NEVER = 2.0
 """Time of a meeting that does not happen within the step, whose times run from 0 to 1."""
 ROUND_OFF = 1e-14
-"""Share of size³ below which a triple product of corners is round-off: some thirty operations."""
+"""Share of size³ below which a triple product of corners counts as round-off, that of some thirty operations."""
 ON = 1e-8
-"""Share of the size within which a point counts as on a triangle: a double root of (11.2) is good to the square root of
-round-off."""
+"""Share of the size within which a point counts as on a triangle: a double root of (11.2) is accurate to the square
+root of round-off."""
 HALVINGS = 60
-"""Of an interval that holds one root: down to the last bit."""
+"""Halvings of an interval with one root: down to the last bit."""
 CREEPS = 200
-"""Steps of an advance that cannot overshoot; a pair that is not through after them has met for all purposes."""
+"""Most steps of the conservative advance; a pair that is still undecided then counts as in contact."""
 
 
 @by_address
@@ -32,7 +32,7 @@ class Pair(NamedTuple):
     tip: np.ndarray
     """The point at the start of the step and at its end [m], (2, 3)."""
     begin: np.ndarray
-    """Corners seen from the point at the start of the step [m], (3, 3)."""
+    """Corners relative to the point at the start of the step [m], (3, 3)."""
     end: np.ndarray
     """The same at its end [m], (3, 3)."""
     corner: np.ndarray
@@ -47,7 +47,7 @@ class Pair(NamedTuple):
 def nearest_into(corner, weight):
     """Weights (3,) of the point of a triangle (3, 3) nearest to the origin; returns its distance [m] (eq. 11.1).
 
-    The best of the foot on the plane, where it lies inside, and of the three edges: right for slivers and points too.
+    The nearest of the foot on the plane, if inside, and of the three edges; correct for degenerate triangles too.
     """
     a0, a1, a2 = corner[0, 0], corner[0, 1], corner[0, 2]
     b0, b1, b2 = corner[1, 0] - a0, corner[1, 1] - a1, corner[1, 2] - a2
@@ -89,7 +89,7 @@ def triple(p, i, q, j, r, k):
 def coplanarity(begin, move):
     """Coefficients of (a + t a') · ((b + t b') × (c + t c')) = f0 + f1 t + f2 t² + f3 t³ [m³] (eq. 11.2).
 
-    f is six times the volume between the point and the triangle: it changes sign where the point passes the plane.
+    f is six times the volume of the tetrahedron of point and triangle; it changes sign as the point crosses the plane.
     """
     f0 = triple(begin, 0, begin, 1, begin, 2)
     f1 = triple(move, 0, begin, 1, begin, 2) + triple(begin, 0, move, 1, begin, 2) + triple(begin, 0, begin, 1, move, 2)
@@ -103,7 +103,7 @@ def turning_points(f1, f2, f3):
     root = f2 * f2 - 3.0 * f1 * f3
     if not root > 0.0:
         return NEVER, NEVER
-    # The two quotients of one sum of like signs: neither loses digits, and a straight line divides by nothing.
+    # Both roots use a sum of terms of equal sign: no digits are lost, and nothing is divided by f3 = 0.
     q = -(f2 + math.copysign(math.sqrt(root), f2))
     first = f1 / q if q != 0.0 else NEVER
     second = q / (3.0 * f3) if f3 != 0.0 else NEVER
@@ -114,7 +114,8 @@ def turning_points(f1, f2, f3):
 
 @njit_lean
 def single_root(low, high, f0, f1, f2, f3):
-    """The root of f0 + f1 t + f2 t² + f3 t³ between `low` and `high`, where its sign differs: halving (eq. 11.2)."""
+    """The root of f0 + f1 t + f2 t² + f3 t³ between `low` and `high`, where the signs differ, by bisection (eq.
+    11.2)."""
     rising = f0 + low * (f1 + low * (f2 + low * f3)) < 0.0
     for _ in range(HALVINGS):
         t = 0.5 * (low + high)
@@ -189,7 +190,7 @@ def touching(pair, radius):
 
 @njit_lean
 def passes_by(pair):
-    """Whether one coordinate of all corners keeps its sign through the step: nothing crosses then (eq. 11.2)."""
+    """Whether one coordinate has the same sign at all corners throughout the step; then nothing crosses (eq. 11.2)."""
     apart, size = 0.0, 0.0
     for axis in range(3):
         low = min(pair.begin[0, axis], pair.begin[1, axis], pair.begin[2, axis])
@@ -202,7 +203,8 @@ def passes_by(pair):
 
 @njit_lean
 def stays_off(corner, distance):
-    """Whether a coordinate of all corners (3, 3) alone keeps them more than `distance` [m] from the origin."""
+    """Whether one coordinate of the corners (3, 3) proves that the triangle is more than `distance` [m] from the
+    origin."""
     apart = 0.0
     for axis in range(3):
         low = min(corner[0, axis], corner[1, axis], corner[2, axis])
@@ -215,8 +217,8 @@ def stays_off(corner, distance):
 def crossing(pair):
     """First time at which the point passes through the triangle, or NEVER: roots of (11.2) at which it lies inside.
 
-    Edges and corners belong to the triangle, so that no path slips between two of them. A point that moves in the
-    plane of its triangle has no root: it meets the rim (`touching`).
+    Edges and corners belong to the triangle, so that no path slips between two of them. A point that moves in the plane
+    of the triangle has no root; `touching` finds its contact with the edge.
     """
     size = 0.0
     for k in range(3):

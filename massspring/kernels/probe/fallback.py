@@ -1,8 +1,8 @@
 """The last resort where contacts alone cannot clear a step: nodes move with a tip (docs/theory.md, eq. 11.7).
 
-Seen from the tip a triangle of carried nodes rests, so it is not passed. One that is held at a corner still turns:
-its carried corners then go ahead of the tip, until the point that was passed rests too. With all three corners held
-there is nothing to move: the tip goes through, and the run records it.
+A triangle whose nodes are all carried is at rest relative to the tip, so the tip cannot pass it. A triangle with a held
+corner still turns: its carried corners then move ahead of the tip until the point that was passed is at rest too. If
+all three corners are held, the tip goes through, and the run records it.
 """
 
 import math
@@ -18,17 +18,17 @@ from massspring.kernels.probe.pressure import answer_into, faster_by, prepare, p
 from massspring.kernels.probe.search import look
 
 CARRY_ROUNDS = 400
-"""Of taking more nodes along, or of sending them farther ahead."""
+"""Most rounds of carrying more nodes, or of moving them farther ahead."""
 LEFT = 1e-9
-"""Share of G·W̃·G that nodes that are not carried must have for the volume to be left to them."""
+"""Share of G·W̃·G that the nodes that are not carried must have to correct the volume alone."""
 FREE_SHARE = 0.02
-"""Weight of the carried corners where a tip hits a triangle, below which its held ones stop it: to stay ahead, a free
-corner would have to go fifty times as far as the tip."""
+"""Weight of the carried corners at the contact point below which a triangle counts as held: to stay ahead, a free
+corner would have to move fifty times as far as the tip."""
 
 
 @njit_lean
 def carry_node(stage, p, i):
-    """Carries node i with the tip of probe p: it takes no share in any volume from then on."""
+    """Carries node i with the tip of probe p; from then on pressures do not move it."""
     probes, contacts = stage.probes, stage.contacts
     probes.carried[i] = p + 1
     probes.taken[probes.taken_count[0]] = i
@@ -36,15 +36,16 @@ def carry_node(stage, p, i):
     probes.counts[CARRIED] += 1
     contacts.mode[i] = STICKS
     for axis in range(3):
-        # What the node would do; `gather` has no more use for it.
+        # The velocity without contact; `gather` no longer needs `v_target`.
         contacts.v_target[i, axis] = probes.base[i, axis]
 
 
 @njit_lean
 def overshoot(stage, p, n):
-    """Sends the carried corners of the near triangle n ahead, until its point that is passed rests seen from the tip.
+    """Moves the carried corners of the near triangle n ahead, so that its passed point is at rest relative to the tip.
 
-    They share Σ b_i Δ_i = −(what the point moves towards the tip) by their weights; whether there are any.
+    The corners share Σ b_i Δ_i = −(motion of the point towards the tip) by their weights. Returns whether there are
+    any.
     """
     probes, pair, radius = stage.probes, stage.probes.pair, stage.probes.radius[p]
     f = probes.near[p, n]
@@ -66,7 +67,7 @@ def overshoot(stage, p, n):
     length = math.sqrt(shift[0] ** 2 + shift[1] ** 2 + shift[2] ** 2)
     if not length > 0.0:
         return False
-    # And a radius more, so that it does not end on the tip.
+    # One radius farther, so that it does not end on the tip.
     farther = (1.0 + radius / (stage.dt * length)) / square
     for k in range(3):
         i = probes.surface[f, k]
@@ -80,7 +81,8 @@ def overshoot(stage, p, n):
 
 @njit_lean
 def carry_triangles(stage, p):
-    """Carries the free corners of all triangles that the tip of probe p passes, or sends those ahead; whether any."""
+    """Carries the free corners of all triangles that the tip of probe p passes, or moves carried ones ahead; whether
+    any."""
     probes, model, contacts = stage.probes, stage.model, stage.contacts
     more = False
     look(stage, p)
@@ -99,9 +101,9 @@ def carry_triangles(stage, p):
 
 @njit_lean
 def compensate_volume(stage, volumes):
-    """δ with dt S δ = −J (v − u) of the carried nodes: the volumes are left to the others (eq. 11.7).
+    """δ with dt S δ = −J (v − u) of the carried nodes: the other nodes correct the volumes (eq. 11.7).
 
-    Returns how much faster it makes a node at most [m/s].
+    Returns a bound on the velocity that δ adds to a node [m/s].
     """
     probes, model, nodes, contacts = stage.probes, stage.model, stage.nodes, stage.contacts
     flow, answer, change = probes.rows.flow[0], probes.rows.answer[0], probes.change
@@ -135,9 +137,10 @@ def compensate_volume(stage, volumes):
 
 @njit_lean
 def carry(stage, volumes, push, plain, horizon):
-    """Nodes of triangles that a tip would pass move with the tip or ahead of it, so that nothing passes it (eq. 11.7).
+    """Moves the nodes of triangles that a tip would pass with the tip or ahead of it, so that it passes none (eq.
+    11.7).
 
-    Returns the factor of the push beside it and what any node moves at most [m].
+    Returns the factor of the push with carried nodes, and a bound on the displacement of any node [m].
     """
     probes = stage.probes
     clear_push(probes.rows, probes.push)
@@ -169,7 +172,7 @@ def carry(stage, volumes, push, plain, horizon):
 
 @njit_lean
 def note_passed(stage):
-    """Counts the step if a tip still goes through a triangle, and keeps the first triangle of each tip."""
+    """Counts the step if a tip still goes through a triangle, and records the first such triangle of each tip."""
     probes = stage.probes
     passed = False
     for p in range(probes.radius.shape[0]):
@@ -184,7 +187,7 @@ def note_passed(stage):
 
 @njit_lean
 def settle_carried(stage, push):
-    """Carried nodes end the step where they were carried: v* takes the difference, the tip's impulse [N s]."""
+    """Changes v* so that carried nodes end the step where they were carried; adds the impulses of the tips [N s]."""
     probes, model, nodes, contacts = stage.probes, stage.model, stage.nodes, stage.contacts
     impulse = probes.diagnostics.contact_impulse
     first = impulse.shape[0] - probes.radius.shape[0]

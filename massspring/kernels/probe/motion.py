@@ -1,4 +1,4 @@
-"""Where the nodes near a thin tip go in the step as it stands, and how its contacts are handed on to the step."""
+"""Motion of the nodes near a thin tip with the current contacts, and the transfer of these contacts to the step."""
 
 import math
 
@@ -34,7 +34,7 @@ def gather(stage, push):
 
 @njit_lean
 def carried_speed(stage, i):
-    """Of a carried node [m/s]: its tip's, and what it goes faster (eq. 11.7)."""
+    """Velocity of a carried node [m/s]: that of its tip plus that relative to the tip (eq. 11.7)."""
     tips, push, dt, step = stage.tips, stage.probes.push, stage.dt, stage.step
     p = stage.probes.carried[i] - 1
     return (
@@ -66,7 +66,7 @@ def move(stage, volumes):
 
 @njit_lean
 def settle(stage):
-    """Hands the contacts on to the step: v* takes their pushes; books them for probes and attachments [N s]."""
+    """Adds the pushes of the contacts to v*, and their impulses to probes and attachments [N s]."""
     probes, model, rows, diagnostics = stage.probes, stage.model, stage.probes.rows, stage.probes.diagnostics
     first = diagnostics.contact_impulse.shape[0] - probes.radius.shape[0]
     for k in range(rows.count[0]):
@@ -87,7 +87,7 @@ def settle(stage):
 
 @njit_lean
 def longest_way(tips, step):
-    """Of any tip in the step [m]."""
+    """Longest displacement of a tip in the step [m]."""
     longest = 0.0
     for p in range(tips.end.shape[1]):
         square = 0.0

@@ -1,4 +1,4 @@
-"""How far a point is from a surface, and on which side of it."""
+"""Distance of a point from a surface, and the winding number of the surface about it."""
 
 import math
 
@@ -9,9 +9,10 @@ from massspring.kernels.probe.continuous import nearest_into
 
 @njit_lean
 def distance_to(point, x, triangles, corner, weight):
-    """Of a point (3,) to the nearest of triangles (f, 3) [m] (eq. 11.1); `corner` (3, 3) and `weight` (3,) are scratch.
+    """Distance of a point (3,) to the nearest of triangles (f, 3) [m] (eq. 11.1); `corner` (3, 3) and `weight` (3,) are
+    scratch.
 
-    A triangle whose box is farther than the nearest so far is passed over.
+    A triangle whose box is farther than the nearest triangle so far is skipped.
     """
     nearest = math.inf
     for f in range(triangles.shape[0]):

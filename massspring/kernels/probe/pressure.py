@@ -1,4 +1,4 @@
-"""The pressures beside point contacts, for one volume, several, or none (docs/theory.md, section 11).
+"""Pressures of the kept volumes with point contacts, for one volume, several, or none (docs/theory.md, section 11).
 
 An impulse c of contact k changes the volumes at the rate g_k c; pressures −S⁻¹ g_k c/dt undo that, S = J W̃ Jᵀ.
 """
@@ -12,13 +12,13 @@ from massspring.kernels.contact.node_contact import allowed_part
 from massspring.kernels.jit.decorators import njit_lean
 
 ACCURATE = 1e-7
-"""Of the largest flow: what an iterative solve may leave. The next step makes up for it, as for every volume error."""
+"""Residual that an iterative solve may leave, over the largest flow. The next step corrects it, as any volume error."""
 MOST_ITERATIONS = 400
 
 
 @njit_lean
 def prepare(stage, volumes):
-    """S for what can move now; factored where it is dense (eq. 8.3)."""
+    """S for the current contacts, factored if it is dense (eq. 8.3)."""
     if volumes is not None:
         diagonal_into(volumes, stage.contacts, stage.model.inverse_mass, volumes.diagonal)
         if volumes.matrix.shape[0] > 0:
@@ -64,7 +64,8 @@ def answer_into(stage, volumes, flow, answer):
 
 @njit_lean
 def change_of_rows(stage):
-    """δ = −Σ_k S⁻¹ g_k c_k/dt [Pa]; how much faster it makes a node at most, √(max w · δ·S δ) dt [m/s] (eq. 11.6)."""
+    """δ = −Σ_k S⁻¹ g_k c_k/dt [Pa]; returns a bound on the velocity it adds to a node, √(max w · δ·S δ) dt [m/s] (eq.
+    11.6)."""
     rows, change = stage.probes.rows, stage.probes.change
     felt = 0.0
     for r in range(change.shape[0]):
@@ -79,13 +80,13 @@ def change_of_rows(stage):
 
 @njit_lean
 def faster_by(stage, felt):
-    """√(max w · dt² δ·S δ) ≥ dt w_i |(Jᵀ δ)_i| [m/s]: how much faster pressures can make any free node."""
+    """√(max w · dt² δ·S δ) ≥ dt w_i |(Jᵀ δ)_i| [m/s]: bound on the velocity that pressures add to any free node."""
     return 1.0001 * math.sqrt(max(stage.model.largest_inverse_mass * felt, 0.0))
 
 
 @njit_lean
 def swelling(stage, volumes, i):
-    """dt W̃_i (Jᵀ δ)_i [m/s], what the change of pressures does to a node (eq. 11.6)."""
+    """dt W̃_i (Jᵀ δ)_i [m/s], the velocity that the change of pressures adds to node i (eq. 11.6)."""
     nodes, contacts, change = stage.nodes, stage.contacts, stage.probes.change
     s0, s1, s2 = 0.0, 0.0, 0.0
     if volumes is None:
@@ -107,7 +108,7 @@ def swelling(stage, volumes, i):
 
 @njit_lean
 def pressed_on(stage, volumes, push):
-    """The factor of the push with the change of pressures; of several volumes the push itself changes."""
+    """The factor of the push after the change of pressures; with several volumes the push itself changes."""
     if volumes is None:
         return push.factor + stage.probes.change[0]
     for r in range(volumes.lam.shape[0]):

@@ -1,4 +1,4 @@
-"""What a thin tip runs into in the step as it stands: triangles passed or too near (docs/theory.md, section 11)."""
+"""Triangles that a thin tip crosses, or comes too near to, with the current contacts (docs/theory.md, section 11)."""
 
 from massspring.kernels.jit.decorators import njit_lean
 from massspring.kernels.probe.arrays import TESTED
@@ -6,14 +6,16 @@ from massspring.kernels.probe.contacts import row_of, set_row
 from massspring.kernels.probe.continuous import NEVER, crossing, nearest_into, passes_by, stays_off, touching
 
 SAME_TIME = 1e-6
-"""Of a step: triangles that share the edge or corner that is met are met together."""
+"""Difference in time, over the step, within which crossings count as simultaneous: triangles that share the edge or
+corner that is hit."""
 ENOUGH = 0.95
-"""Share of the radius left at which a contact is not turned once more: what is missing is second order in the step."""
+"""Share of the radius from which on the direction of a contact is not updated: the missing distance is second order in
+the step."""
 
 
 @njit_lean
 def pair_into(pair, x, velocity, triangles, f, dt):
-    """Corners of a triangle seen from the tip of `pair`, at the start of the step and at its end [m]."""
+    """Corners of a triangle relative to the tip of `pair`, at the start of the step and at its end [m]."""
     for k in range(3):
         i = triangles[f, k]
         for axis in range(3):
@@ -24,7 +26,8 @@ def pair_into(pair, x, velocity, triangles, f, dt):
 
 @njit_lean
 def look(stage, p):
-    """When and where the tip passes through each near triangle in the step as it stands; the first time, or NEVER."""
+    """When and where the tip passes through each near triangle with the current contacts. Returns the first time, or
+    NEVER."""
     probes, x, triangles, pair = stage.probes, stage.nodes.x, stage.probes.surface, stage.probes.pair
     for axis in range(3):
         pair.tip[0, axis] = stage.tips.start[stage.step, p, axis]
@@ -44,9 +47,9 @@ def look(stage, p):
 
 @njit_lean
 def add_crossings(probes, p, first):
-    """A contact for every triangle that the tip passes through at the first time; how many found room.
+    """Adds a contact for every triangle that the tip passes through at time `first`; returns how many found room.
 
-    What lies beyond it would be met only by a tip that nothing had stopped.
+    Later crossings do not count: the contacts found first stop the tip.
     """
     room = 0
     for n in range(probes.near_count[p]):
@@ -59,9 +62,10 @@ def add_crossings(probes, p, first):
 
 @njit_lean
 def add_touches(stage, p):
-    """A contact for every triangle that ends the step within the radius, where it first touches; how many found room.
+    """Adds a contact for every triangle that ends the step within the radius, at the point where it first touches;
+    returns how many found room.
 
-    A triangle that has its contact and turned away under it gets the direction of the end of the step.
+    A triangle that already has a contact, but turned under it, gets the direction at the end of the step.
     """
     room, probes, pair, triangles = 0, stage.probes, stage.probes.pair, stage.probes.surface
     for n in range(probes.near_count[p]):
@@ -87,7 +91,7 @@ def add_touches(stage, p):
 
 @njit_lean
 def search(stage):
-    """Adds what the step as it stands runs into; (contacts that found room, whether a tip crosses)."""
+    """Adds contacts for all that the tips run into; returns (contacts that found room, whether a tip crosses)."""
     count, crosses = 0, False
     for p in range(stage.probes.radius.shape[0]):
         first = look(stage, p)

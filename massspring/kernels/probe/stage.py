@@ -1,7 +1,7 @@
-"""The stage of thin probes in a step: what a tip runs into, the contacts that stop it, and a last resort.
+"""The stage of thin probes in a step: search for crossings, contacts that stop the tip, and a last resort.
 
-Nothing is left to the size of a step: the motion that the step will make is searched for crossings, each becomes a
-contact, and the search begins again until nothing crosses (docs/theory.md, section 11).
+The result holds for steps of any size: the motion of the step is searched for crossings, each becomes a contact, and
+the search repeats until nothing crosses (docs/theory.md, section 11).
 """
 
 import math
@@ -16,15 +16,15 @@ from massspring.kernels.probe.pressure import prepare, pressed_on
 from massspring.kernels.probe.search import search
 
 PASSES = 24
-"""Searches for what the last solution runs into; each adds contacts or turns one."""
+"""Most searches per step; each adds contacts or changes the direction of one."""
 
 
 @njit_lean
 def meet_probes(stage, volumes, push):
     """Contact with thin probes, once pressures and the other contacts of the step are known (eq. 11.1–11.7).
 
-    Returns the factor of the push beside the contacts. One volume: the factor is its pressure [Pa]. Several:
-    `volumes`, whose lam and push are changed in place. A push that contacts do not change: `stage.mobility` is 0.
+    Returns the factor of the push after contact. One volume: the factor is its pressure [Pa]. Several: lam and push of
+    `volumes` are changed in place. If contacts do not change the push, `stage.mobility` is 0.
     """
     nodes, tips, probes, step, dt = stage.nodes, stage.tips, stage.probes, stage.step, stage.dt
     factor = push.factor

@@ -1,4 +1,4 @@
-"""The end of a step: symplectic Euler for all nodes, and what obstacles gave."""
+"""The end of a step: symplectic Euler for all nodes, and the impulses of obstacles."""
 
 from massspring.kernels.contact.bookkeeping import book_contacts, settled
 from massspring.kernels.contact.modes import FREE
@@ -8,14 +8,14 @@ from massspring.kernels.jit.flat import flat
 from massspring.kernels.jit.thread_team import JOB_MOVE, fork, join
 
 NEAR = 4096
-"""Nodes of which a step's end fits the second cache."""
+"""Nodes per block, so that the data of the end of a step fits the second-level cache."""
 
 
 @njit_inlined
 def advance_nodes(nodes, contacts, work, inverse_mass, push, dt, part):
     """v⁺ = ṽ + dt W̃ f, x⁺ = x + dt v⁺ (eq. 3.5) of the nodes first ≤ i < last in `part`.
 
-    `padded_positions` holds the x of the step's start.
+    `padded_positions` holds x at the start of the step.
     """
     first, last = part
     flat_x, flat_v = flat(nodes.x, first, last), flat(nodes.v, first, last)
@@ -39,7 +39,7 @@ def advance_nodes(nodes, contacts, work, inverse_mass, push, dt, part):
 
 @njit_exposed
 def advance(frame, push):
-    """The end of a step of all nodes (eq. 3.5); books the impulse of each obstacle, pads the new positions."""
+    """The end of a step of all nodes (eq. 3.5); adds the impulse of each obstacle and pads the new positions."""
     model, nodes, contacts, dt = frame.model, frame.nodes, frame.contacts, frame.boundary.dt
     book_contacts(model, nodes, contacts, push, dt, frame.diagnostics.contact_impulse)
     move_all(frame, push, frame.team)
@@ -58,7 +58,8 @@ def move_all(frame, push, team):
 
 @njit_inlined
 def move(frame, push, first, last):
-    """`advance_nodes` and `pad_positions` of some nodes; `NEAR` at a time, so that new positions are still at hand."""
+    """`advance_nodes` and `pad_positions` of some nodes; `NEAR` at a time, so that the new positions are still in the
+    cache."""
     nodes, work, weights = frame.nodes, frame.work, frame.model.inverse_mass
     for begin in range(first, last, NEAR):
         end = min(begin + NEAR, last)

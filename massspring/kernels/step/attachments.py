@@ -15,7 +15,7 @@ def prescribe_velocity_into(x, held_nodes, held_group, held_rest, displacement, 
 
 @njit_exposed
 def prescribe(model, nodes, displacement, dt):
-    """v* of held nodes (eq. 3.2); returns what that changes of G·v* [m³/s]."""
+    """v* of held nodes (eq. 3.2); returns the change of G·v* [m³/s]."""
     held_nodes, groups, rest = model.held_nodes, model.held_group, model.held_rest
     x, v_star, gradient = nodes.x, nodes.v_star, nodes.gradient
     flow, per_step = 0.0, 1.0 / dt
@@ -30,7 +30,8 @@ def prescribe(model, nodes, displacement, dt):
 
 @njit_exposed
 def add_held_impulse(model, nodes, push, dt, gravity, held_impulse):
-    """I_g = −dt Σ_i∈g (f_i + push_i + m_i g) [N s]: what an attachment gives to a body in slow motion (eq. 3.6)."""
+    """I_g = −dt Σ_i∈g (f_i + push_i + m_i g) [N s]: impulse of an attachment on the body, without the inertia of held
+    nodes (eq. 3.6)."""
     held_nodes, groups, mass = model.held_nodes, model.held_group, model.mass
     force, direction, factor = nodes.force, push.direction, push.factor
     h, count = 0, held_nodes.shape[0]

@@ -1,4 +1,4 @@
-"""How every step begins: all that is known before the volumes are solved for, and which nodes touch obstacles."""
+"""The beginning of every step: the prediction before the volumes are solved for, and the search for contacts."""
 
 from massspring.kernels.contact.active_set import CONTACT_PASSES, find_contacts, revise_contacts
 from massspring.kernels.fused.padded import pad_positions
@@ -10,7 +10,7 @@ from massspring.kernels.step.attachments import prescribe, prescribe_velocity_in
 
 @njit_exposed
 def open_frame(frame):
-    """Books the time between two frames, and pads the positions for the first step."""
+    """Records the time between two frames, and pads the positions for the first step."""
     end_stage(frame.diagnostics.stage_times, BETWEEN_FRAMES)
     pad_positions(frame.nodes, frame.work, 0, frame.nodes.x.shape[0])
 
@@ -34,7 +34,7 @@ def begin_step(frame, step, keeps):
 
 @njit_inlined
 def begin_summed_step(frame, step):
-    """The same with G and with G·v* [m³/s] of all nodes, so that no other pass sums it: (V, G·v*, G·W·G)."""
+    """`begin_step` with G, which also sums G·v* [m³/s] over all nodes in the same pass: (V, G·v*, G·W·G)."""
     model, nodes, boundary = frame.model, frame.nodes, frame.boundary
     volume, flow, mobility = predict_from_places(model, nodes, frame.work, boundary, True, frame.team)
     end_stage(frame.diagnostics.stage_times, SPRINGS)
@@ -45,7 +45,8 @@ def begin_summed_step(frame, step):
 
 @njit_exposed
 def search_contacts(frame, step, push):
-    """Finds the nodes that touch while the last known push acts (eq. 3.7); how many passes the active set may take."""
+    """Finds the nodes that touch with the push of the last step (eq. 3.7). Returns how many passes the active set may
+    take."""
     if frame.boundary.radius.shape[0] == 0:
         return 1
     find_contacts(frame.model, frame.nodes, frame.contacts, frame.boundary, step, push, frame.team)
@@ -55,9 +56,10 @@ def search_contacts(frame, step, push):
 
 @njit_inlined
 def multiplier_stands(frame, step, push, reach, last):
-    """Whether the push just solved for leaves the touched nodes as they are (eq. 3.8), or this was the last pass.
+    """Whether the new push leaves the set of touched nodes unchanged (eq. 3.8), or this was the last pass.
 
-    `reach` [m]: how far the new push can have moved a node; where contacts change, the multiplier is solved for again.
+    `reach` [m]: how far the new push can have moved a node; if contacts change, the caller solves for the multiplier
+    again.
     """
     end_stage(frame.diagnostics.stage_times, MULTIPLIER)
     if last:
@@ -69,6 +71,6 @@ def multiplier_stands(frame, step, push, reach, last):
 
 @njit_inlined
 def count_iterations(diagnostics, count):
-    """Books the iterations of one solve for multipliers."""
+    """Records the iterations of one solve for multipliers."""
     diagnostics.iterations[0] += count
     diagnostics.iterations[1] = max(diagnostics.iterations[1], count)

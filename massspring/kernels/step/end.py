@@ -1,4 +1,4 @@
-"""How every step ends: thin probes, what attachments and obstacles gave, and the motion of all nodes."""
+"""The end of every step: thin probes, impulses of attachments and obstacles, and the motion of all nodes."""
 
 from massspring.kernels.arrays.layout import Push
 from massspring.kernels.jit.decorators import njit_exposed, njit_inlined
@@ -11,10 +11,10 @@ from massspring.kernels.step.attachments import add_held_impulse
 
 @njit_exposed
 def end_step(frame, step, push, mobility, volumes):
-    """Contact with thin probes, bookings, v⁺ and x⁺ (eq. 3.5, 3.6, 11.1–11.7).
+    """Contact with thin probes, impulses of attachments and obstacles, v⁺ and x⁺ (eq. 3.5, 3.6, 11.1–11.7).
 
-    `mobility` is G·W̃·G [m⁴/kg] where one volume is solved for, else 0; `volumes` are several that are solved for, or
-    None. Returns the factor of the push beside the contacts of probes: of one volume its pressure [Pa].
+    `mobility` is G·W̃·G [m⁴/kg] if the method solves for one volume, else 0; `volumes` if it solves for several, else
+    None. Returns the factor of the push after contact with probes: for one volume its pressure [Pa].
     """
     factor = probed(frame, step, push, mobility, volumes, frame.probing)
     push = Push(push.direction, factor)
@@ -28,7 +28,7 @@ def end_step(frame, step, push, mobility, volumes):
 
 @njit_inlined
 def probed(frame, step, push, mobility, volumes, probing):
-    """The stage of thin probes where there are any; the factor of the push beside it."""
+    """Runs the stage of thin probes if there are any; returns the factor of the push after it."""
     if probing is None:
         return push.factor
     boundary = frame.boundary

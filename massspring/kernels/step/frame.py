@@ -1,4 +1,4 @@
-"""What a frame loop is given, as one tuple: kernels take the parts of it that they use."""
+"""The arguments of a frame loop as one tuple; kernels take the parts that they use."""
 
 from typing import NamedTuple
 
@@ -10,7 +10,7 @@ from massspring.kernels.probe.arrays import Probing
 
 @by_address
 class Frame(NamedTuple):
-    """A body, its surroundings during a frame, and what the frame measures of itself."""
+    """A body, its surroundings during a frame, and the diagnostics of the frame."""
 
     model: Model
     nodes: Nodes
@@ -19,6 +19,6 @@ class Frame(NamedTuple):
     boundary: BoundaryConditions
     diagnostics: FrameDiagnostics
     probing: Probing | None = None
-    """Thin probes; None where there are none: the loop is then compiled without their stage."""
+    """Thin probes, or None; with None the loop is compiled without their stage."""
     team: ThreadTeam | None = None
-    """Threads that share the longest loops; None for one thread. Only loops are compiled again for it."""
+    """Threads that share the longest loops; None for one thread. Only the loops are compiled again for threads."""

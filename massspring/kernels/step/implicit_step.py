@@ -1,4 +1,4 @@
-"""What a pass of the implicit springs starts from."""
+"""The residual with which a pass of the implicit springs starts."""
 
 from massspring.kernels.constraint.jacobian import rows_into, transposed_rows_times_into
 from massspring.kernels.forces.springs import spring_forces_into

@@ -5,7 +5,8 @@ from massspring.kernels.jit.decorators import compiled
 
 @compiled
 def add_to_prediction(model, nodes, force, dt):
-    """v* += dt W f [m/s] for one more force [N], (n, 3), booked at held nodes too (eq. 3.1, 3.6)."""
+    """v* += dt W f [m/s] for one more force [N], (n, 3), which is also added to the force on held nodes (eq. 3.1,
+    3.6)."""
     for i in range(force.shape[0]):
         push = dt * model.inverse_mass[i]
         nodes.v_star[i, 0] += push * force[i, 0]

@@ -1,4 +1,4 @@
-"""What the other threads of a team do during a frame (kernels.jit.thread_team)."""
+"""Work of the other threads of a team during a frame (kernels.jit.thread_team)."""
 
 from massspring.kernels.arrays.layout import Push
 from massspring.kernels.contact.gaps import predicted_gaps_into
@@ -23,7 +23,7 @@ from massspring.kernels.step.advance import advance_nodes
 
 @njit_lean
 def worker(frame, team, direction, rank):
-    """Does part number `rank` of every job of a frame up to its end; `direction` is that of its pushes."""
+    """Does part number `rank` of every job until the frame ends; `direction` (n, 3) is that of the pushes."""
     model, nodes, contacts, work, boundary = frame.model, frame.nodes, frame.contacts, frame.work, frame.boundary
     slices = team.slices[rank], team.slices[rank + 1]
     part = team.nodes[rank], team.nodes[rank + 1]

@@ -1,4 +1,5 @@
-"""When the faces of a cut touch: with the search for obstacles, and after each solve for the multipliers."""
+"""Search for touching faces of a cut: together with the search for obstacles, and after each solve for the
+multipliers."""
 
 from massspring.kernels.contact.active_set import CONTACT_PASSES
 from massspring.kernels.contact.face_pairs import measure_pairs, revise_pairs, turn_faces
@@ -9,8 +10,8 @@ from massspring.kernels.step.begin import multiplier_stands
 
 @njit_inlined
 def begin_pairs(frame, pairs, gradient):
-    """Measures the pairs, and lets the impulses of the last step turn their faces, before anything else asks for v*;
-    what G·v* gains by it [m³/s], 0 without a `gradient`."""
+    """Measures the pairs, and applies to v* the rotation of their faces by the impulses of the last step, before v* is
+    used elsewhere. Returns the change of G·v* [m³/s], 0 without a `gradient`."""
     if pairs is None:
         return 0.0
     measure_pairs(pairs, frame.nodes.x, frame.model.inverse_mass)
@@ -21,7 +22,8 @@ def begin_pairs(frame, pairs, gradient):
 
 @njit_inlined
 def search_pairs(frame, push, passes, pairs):
-    """Finds the pairs that touch while the last known push acts (eq. 9.9); how many passes the active set may take."""
+    """Finds the pairs that touch with the push of the last step (eq. 9.9). Returns how many passes the active set may
+    take."""
     if pairs is None:
         return passes
     revise_pairs(pairs, frame.model, frame.nodes, frame.contacts, push, frame.boundary.dt)
@@ -31,7 +33,7 @@ def search_pairs(frame, push, passes, pairs):
 
 @njit_inlined
 def contacts_stand(frame, step, push, reach, last, pairs):
-    """`multiplier_stands`, and whether the push leaves the touching pairs as they are (eq. 9.9)."""
+    """As `multiplier_stands`, for the touched nodes and the touching pairs (eq. 9.9)."""
     if pairs is None:
         return multiplier_stands(frame, step, push, reach, last)
     stands = multiplier_stands(frame, step, push, reach, last or frame.boundary.radius.shape[0] == 0)

@@ -3,8 +3,8 @@
 Baumgarte, Computer Methods in Applied Mechanics and Engineering 1 (1972): instead of d²V/dt² = 0, which drifts, ask for
 d²(V − V0)/dt² + 2 alpha d(V − V0)/dt + beta² (V − V0) = 0 (docs/theory.md, eq. 10.5).
 
-Limits: stable for (beta dt)² + 4 alpha dt < 4 and 0 < 2 alpha dt < 2. A wrong volume takes time to correct: the larger
-root of eq. 10.6 is what a step leaves of it. 2 alpha = beta = 1/dt is HCJ05 with the convective term.
+Limits: stable for (beta dt)² + 4 alpha dt < 4 and 0 < 2 alpha dt < 2. Correcting a volume error takes time: the larger
+root of eq. 10.6 is the share of it that a step leaves. 2 alpha = beta = 1/dt is HCJ05 with the convective term.
 """
 
 from dataclasses import dataclass
@@ -23,8 +23,8 @@ class Baumgarte(Method):
     """Lets a wrong volume die away like a damped oscillation, at rates per time step."""
 
     alpha: float = 0.5
-    """alpha dt [1]. alpha = beta is critical damping, Baumgarte's own choice; a half leaves 75 % of a wrong volume
-    after a step and 1 % after 16, with (beta dt)² + 4 alpha dt = 2.25 of the 4 that are stable."""
+    """alpha dt [1]. alpha = beta is critical damping, as Baumgarte chose; 0.5 leaves 75 % of a volume error after one
+    step and 1 % after 16, with (beta dt)² + 4 alpha dt = 2.25 of the 4 that are stable."""
     beta: float = 0.5
     """beta dt [1]."""
 
@@ -41,7 +41,7 @@ class Baumgarte(Method):
 
     @property
     def stable(self) -> bool:
-        """Whether a wrong volume dies away: (beta dt)² + 4 alpha dt < 4 and 2 alpha dt < 2 (eq. 10.6)."""
+        """Whether a volume error decays: (beta dt)² + 4 alpha dt < 4 and 2 alpha dt < 2 (eq. 10.6)."""
         return self.beta**2 + 4.0 * self.alpha < 4.0 and 2.0 * self.alpha < 2.0
 
     def advance(self, state: State, boundary: BoundaryConditions) -> State:

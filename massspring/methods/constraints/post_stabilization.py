@@ -3,8 +3,8 @@
 Cline and Pai, IEEE International Conference on Robotics and Automation (2003). First dV/dt = 0 at the end of the step,
 then x += W̃ G (V0 − V)/(G·W̃·G) at the new positions, velocities untouched (docs/theory.md, eq. 10.3, 10.7).
 
-Limits: the correction does not see the dynamics, it moves nodes that have no such velocity: small kicks in the springs,
-and no exact spin. A target that moves is followed by the positions alone.
+Limits: the correction ignores the dynamics. It moves nodes without a change of velocity, which excites the springs
+slightly and does not conserve angular momentum exactly. Only the positions follow a moving target.
 """
 
 from dataclasses import dataclass

@@ -5,7 +5,8 @@ the volume gradient of the *predicted* shape until the volume is right; velociti
 of the cubic (docs/theory.md, eq. 10.1–10.3).
 
 Limits: the pressure acts along a gradient that is a step ahead of the positions, so that under sustained pressure and
-without damping the body gains energy at the rate of eq. 10.4, and spin where it turns. HCJ05 and SHAKE do neither.
+without damping the body gains energy at the rate of eq. 10.4, and angular momentum if it turns. HCJ05 and SHAKE gain
+neither.
 """
 
 from dataclasses import dataclass

@@ -1,1 +1,1 @@
-"""Elastic elements, explicit and implicit in time: what is taken instead of mass-spring bodies."""
+"""Elastic finite elements, explicit and implicit in time: the usual alternative to mass-spring bodies."""

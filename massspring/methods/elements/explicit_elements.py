@@ -5,12 +5,12 @@ Joldes, Wittek, Miller (2009). The energy per rest volume
 
     W = mu/2 (|F|² − 3) − mu (J − 1) + K/2 (J − 1)²
 
-has its first term in the springs without length of the body (docs/theory.md, eq. 4.4, 4.9), the other two in a pressure
-that each kept volume knows from its size, p_r = mu + K (V0_r − V_r)/V0_r (eq. 13.2). One volume per node of a linear
-body is the average nodal pressure.
+has its first term in the springs without length of the body (docs/theory.md, eq. 4.4, 4.9). The other two give each
+kept volume the explicit pressure p_r = mu + K (V0_r − V_r)/V0_r (eq. 13.2). One volume per node of a linear body is the
+average nodal pressure.
 
-Limits: as bulk modulus K − mu/3 on linear bodies, K on quadratic ones, is finite, what pressure p there is costs p/K of
-a volume; a large K shortens the step as 1/√K.
+Limits: the bulk modulus, K − mu/3 on linear bodies and K on quadratic ones, is finite, so a pressure p changes a volume
+by p/K; a large K shortens the step as 1/√K.
 """
 
 from dataclasses import dataclass, replace
@@ -42,12 +42,13 @@ from massspring.methods.method import Method, begin_frame
 from massspring.world.obstacles import Attachment
 
 WRONG = 1e-6
-"""Of a volume: what one without gradient may be off before a step is counted."""
+"""Relative error of a volume without gradient above which the step is counted as singular."""
 
 
 @njit_inlined
 def pressures_into(rows, mobility, rest_lam, bulk_modulus, target):
-    """p_r = rest_lam_r + K (V0_r − V_r)/V0_r [Pa] (eq. 13.2); whether a wrong volume has nothing to push on."""
+    """p_r = rest_lam_r + K (V0_r − V_r)/V0_r [Pa] (eq. 13.2). Returns whether a volume with an error has no
+    gradient."""
     idle = False
     for r in range(target.shape[0]):
         missing = (target[r] - rows.volume[r]) / target[r]
@@ -70,7 +71,7 @@ def linear_elements_frame(frame, rows, bulk_modulus):
         transposed_rows_times_into(rows, rows.lam, rows.push)
         end_stage(diagnostics.stage_times, VOLUME)
         search_contacts(frame, step, push)
-        # No contact changes a known pressure: no mobility.
+        # Contact does not change an explicit pressure, so the mobility is 0.
         end_step(frame, step, push, 0.0, None)
 
 
@@ -94,7 +95,7 @@ def quadratic_elements_frame(frame, rows, bulk_modulus):
 
 @njit_inlined
 def follow_targets(elements, rest_volumes, target):
-    """J* of each tetrahedron: the mean of what its nodal volumes want of their rest volumes."""
+    """Sets J* of each tetrahedron: the mean over its nodal volumes of target over rest volume."""
     for e in range(elements.node.shape[0]):
         ratio = 0.0
         for a in range(4):
@@ -119,7 +120,7 @@ def corotated_elements_frame(frame, elements, rest_volumes, force):
 
 
 class Corotated(NamedTuple):
-    """What a state of corotated elements remembers."""
+    """The memory of a state with corotated elements."""
 
     body: Body
     elements: Elements
@@ -130,13 +131,13 @@ class ExplicitElements(Method):
     """Explicit finite elements (TLED): neo-Hookean tetrahedra with average nodal pressure, or corotated ones."""
 
     bulk_ratio: float = 50.0
-    """K over the shear modulus [1]; 50 is a Poisson ratio of 0.49. Against the step of the same body with its volumes
-    solved for, 10 takes 18 to 42 % off, 50 takes 60 to 73 %, 1000 takes 91 to 94 % (a ball and a liver, linear and
+    """K over the shear modulus [1]; 50 is a Poisson ratio of 0.49. Compared with the same body under implicit_volume,
+    10 shortens the step by 18 to 42 %, 50 by 60 to 73 %, 1000 by 91 to 94 % (a ball and a liver, linear and
     quadratic)."""
     law: LawName = "neo_hookean"
     """"corotated": linear elasticity in frames that turn with the elements (docs/theory.md, eq. 13.11).
-    Each has a pressure of its own, so that they lock. Reported is that of small strains, (K − mu/3) (1 − V/V0) of each
-    nodal volume."""
+    Each element has a separate pressure, so they lock. The reported pressure is that of small strains, (K − mu/3) (1 −
+    V/V0) of each nodal volume."""
 
     name: ClassVar[str] = "explicit_elements"
     order: ClassVar[int] = 1
@@ -160,7 +161,8 @@ class ExplicitElements(Method):
         return why_not_corotated(body) if reason is None and self.law == "corotated" else reason
 
     def added_stiffness(self, body: Body) -> csr_array:
-        """Jᵀ diag(K/V0) J, with J at rest (eq. 13.3); of corotated elements with the volumes of tetrahedra."""
+        """B with B Bᵀ = Jᵀ diag(K/V0) J, J at rest (eq. 13.3); for corotated elements with the volumes of
+        tetrahedra."""
         if self.law == "corotated":
             elements = elements_of(body, self.bulk_ratio * body.rest_pressure)
             count = len(elements.node)
@@ -173,7 +175,7 @@ class ExplicitElements(Method):
         return csr_array(body.kept.jacobian(body.rest).T @ diags_array(weight))
 
     def start(self, body: Body, attachments: tuple[Attachment, ...] = (), v: np.ndarray | None = None) -> State:
-        """The body at rest, or with velocities `v` (n, 3) [m/s]; it remembers K [Pa]."""
+        """The body at rest, or with velocities `v` (n, 3) [m/s], with K [Pa] in its memory."""
         bulk = self.bulk_ratio * body.rest_pressure
         memory = Corotated(body, elements_of(body, bulk)) if self.law == "corotated" else bulk
         return start(body, attachments, v, memory=memory)

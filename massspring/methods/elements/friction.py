@@ -1,4 +1,5 @@
-"""Coulomb's friction in Newton passes: along the last force less what resists the slip since (eq. 13.8)."""
+"""Coulomb's friction in Newton passes: directed along the last force minus a resistance to the slip since then (eq.
+13.8)."""
 
 import numpy as np
 
@@ -6,22 +7,23 @@ from massspring.kernels.contact.modes import FREE, SLIDES, STICKS
 from massspring.methods.implicit.contact import SLIP_RESOLUTION, Contact, TouchedRows
 
 WITHIN = 1.0 - 1e-9
-"""Of what friction gives at most: below it is not round-off."""
+"""Share of the friction limit below which a node sticks: allows for round-off."""
 
 
 class RubbedContact(Contact):
-    """Touched nodes whose friction turns by their slip from pass to pass, and does not jump.
+    """Touched nodes whose friction changes direction gradually from pass to pass.
 
-    Along the slip alone, as with springs, nodes of soft elements that hardly slip would change their minds for ever.
+    If friction were along the slip, as with springs, nodes of soft elements that hardly slip would alternate without
+    end.
     """
 
     resistance: np.ndarray
-    """What a node resists a slip with [kg], (n,)."""
+    """Resistance r of each node to slip [kg], (n,)."""
     let_go: np.ndarray | None = None
-    """Nodes that stuck in this step and were pulled off, (n,) bool; None before its first pass."""
+    """Nodes that stuck in this step and were then pulled off, (n,) bool; None before the first pass of the step."""
 
     def revise(self, end: np.ndarray, active: TouchedRows, impulses: np.ndarray) -> bool:
-        """As with springs; remembers the nodes that stuck and are pulled off."""
+        """As with springs; also records the nodes that stuck and are pulled off."""
         mode = self.contacts.mode
         stuck = mode == STICKS
         revised = super().revise(end, active, impulses)
@@ -29,13 +31,13 @@ class RubbedContact(Contact):
         return revised
 
     def meet(self, nodes: np.ndarray, carried: np.ndarray) -> None:
-        """Nodes that come to a rough obstacle stick at first, but for those that were pulled off when they did."""
+        """Nodes that reach a rough obstacle stick at first, except those that were pulled off while they stuck."""
         new = slice(None) if self.let_go is None else ~self.let_go[nodes]
         self.stick(nodes[new], carried[new])
 
     def apply_friction(self, end: np.ndarray, active: TouchedRows, impulses: np.ndarray) -> bool:
-        """F ← mu γ_n t/|t|, t = F − r s with the slip s of the last pass; a node sticks where |t| < mu γ_n: whether one
-        does."""
+        """F ← mu γ_n t/|t|, t = F − r s with the slip s of the last pass; a node sticks if |t| < mu γ_n. Returns
+        whether one does."""
         if not self.boundary.rough:
             return False
         slides = self.rubbed(active)
@@ -51,8 +53,8 @@ class RubbedContact(Contact):
         return bool(sticks.any())
 
     def stiffness(self, end: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Nodes that slip, (c,), and what their friction gives when the slip s turns, |F|/|s| (1 − ŝ ŝᵀ − n nᵀ) [kg],
-        (c, 3, 3), in a step that ends at `end` (n, 3)."""
+        """Slipping nodes, (c,), and the derivative of their friction by the slip s, |F|/|s| (1 − ŝ ŝᵀ − n nᵀ) [kg], (c,
+        3, 3), in a step that ends at `end` (n, 3)."""
         nodes = np.flatnonzero((self.contacts.mode == SLIDES) & self.friction_impulse.any(axis=1))
         slip = self.boundary.dt * self.slip(end, nodes)
         length = np.linalg.norm(slip, axis=1)

@@ -12,10 +12,10 @@ with b = mu/3 on quadratic bodies, 0 on linear ones. A step solves
 by Newton's method with the exact derivative of f, factored in every pass; attached nodes are eliminated, obstacles
 hold nodes as constraints C of each pass, with friction as in `implicit_springs`.
 
-Limits: linear tetrahedra lock, the more the larger K: held at both caps and pressed, a ball of 251 nodes takes 78 % too
-much force with a ratio of 50, 24 % with 10; a quadratic one of 350 nodes 19 % with 50. Long steps lose energy. Python
-runs once per pass. Obstacles touch nodes alone, which on quadratic facets are pressed unevenly. A step whose passes do
-not settle, as some with friction do, is counted among those with limited corrections.
+Limits: linear tetrahedra lock, the more so the larger K: the force on a ball of 251 nodes, held at both caps and
+pressed, is 78 % too large with a ratio of 50 and 24 % with 10; with quadratic elements and 350 nodes 19 % with 50. Long
+steps lose energy. Python runs once per pass. Obstacles touch only nodes, which on quadratic facets carry pressure
+unevenly. A step whose passes do not converge, as can happen with friction, counts as one with a limited correction.
 """
 
 from dataclasses import dataclass, replace
@@ -52,12 +52,12 @@ class ImplicitElements(Method):
     bulk_ratio: float = 50.0
     """K over the shear modulus [1]; 50 is a Poisson ratio of 0.49."""
     tolerance: float = 1e-6
-    """Motion of a pass, over the mean length of a spring, after which none is made [1]."""
+    """Largest motion of a pass, over the mean length of a spring, at which the passes end [1]."""
     most_passes: int = 20
-    """In a step, with a factorisation each."""
+    """Most passes in a step; each takes a factorisation."""
     law: LawName = "neo_hookean"
     """"corotated": linear elasticity in frames that turn with the elements (docs/theory.md, eq. 13.11).
-    Its pressure is reported as that of small strains, (K − mu/3) (1 − V/V0) of each nodal volume."""
+    The reported pressure is that of small strains, (K − mu/3) (1 − V/V0) of each nodal volume."""
 
     name: ClassVar[str] = "implicit_elements"
     order: ClassVar[int] = 1

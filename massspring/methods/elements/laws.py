@@ -15,14 +15,15 @@ LawName = Literal["neo_hookean", "corotated"]
 
 
 class Law(NamedTuple):
-    """Energy, forces and stiffness of `Elements`, beside the springs without length of the body."""
+    """Energy, forces and stiffness of `Elements`, in addition to the springs without length of the body."""
 
     energy: Callable
     """(elements, x) -> [J]."""
     forces_into: Callable
-    """(elements, x, force): forces [N], (n, 3), in place; whether an element has no direction to push in."""
+    """(elements, x, force): forces [N] into `force` (n, 3); returns whether an element has no gradient."""
     add_stiffness: Callable
-    """(elements, places, x, factor, exact, data): `factor` times minus their derivative, or what is positive of it."""
+    """(elements, places, x, factor, exact, data): adds `factor` times minus their derivative to `data`, or only a
+    positive part of it if not `exact`."""
 
 
 ELEMENT_LAWS: dict[str, Law] = {
@@ -32,9 +33,9 @@ ELEMENT_LAWS: dict[str, Law] = {
 
 
 def supported(table: Capabilities, name: str, law: str) -> Capabilities:
-    """What a method of this name supports with a law, of what its `table` has.
+    """The capabilities of a method called `name` with the law `law`; `table` holds those with the default law.
 
-    Raises MassSpringError for a law that there is not.
+    Raises MassSpringError for an unknown law.
     """
     if law not in ELEMENT_LAWS:
         raise MassSpringError(f"{name}'s law is '{law}'; choose {' or '.join(ELEMENT_LAWS)}")

@@ -19,19 +19,19 @@ from massspring.methods.elements.tangent import Pattern, Tangent, target_ratios
 from massspring.methods.implicit.contact import TouchedRows
 
 REVISIONS = 12
-"""Of the touched set in one pass; where nodes still come and go, the next pass goes on."""
+"""Most revisions of the touched set in one pass; if it still changes, the next pass continues."""
 SUFFICIENT = 1e-4
-"""Of the decrease that the slope promises (Armijo)."""
+"""Share of the decrease predicted by the slope that a step must achieve (Armijo)."""
 SHORTEST = 2.0**-10
-"""Part of a pass's motion that is taken at least."""
+"""Smallest part of the motion of a pass that the line search takes."""
 TOUCHING = 1e-9
-"""Of the longest correction, 0.3 of an edge: a node this near to an obstacle begins a step on it."""
+"""Distance over the correction limit, 0.3 of an edge, within which a node starts a step on an obstacle."""
 ROUND_OFF = 1e-13
-"""Of the largest term of a potential."""
+"""Round-off of a potential over its largest term."""
 
 
 class Rows(TouchedRows):
-    """The touched directions and their Schur complement with the tangent of a pass, C T⁻¹ Cᵀ."""
+    """The contact directions C and their Schur complement with the tangent T of a pass, C T⁻¹ Cᵀ."""
 
     def __init__(self, tangent: Tangent, nodes: Nodes, contacts: Contacts, surface: np.ndarray, dt: float) -> None:
         super().__init__(nodes, contacts, surface, dt)
@@ -58,7 +58,7 @@ class Rows(TouchedRows):
 
 @dataclass(frozen=True, eq=False)
 class Prepared:
-    """What a run makes once."""
+    """Data that a run computes once."""
 
     body: Body
     elements: Elements
@@ -82,15 +82,15 @@ class Prepared:
 
 
 class Ending(NamedTuple):
-    """When the passes of a step end."""
+    """Stopping criteria for the passes of a step."""
 
     tolerance: float
-    """Largest motion of a pass after which none is made [m]."""
+    """Largest motion of a pass at which the passes end [m]."""
     most: int
 
 
 class NewtonStep:
-    """One step in the making."""
+    """One step during its computation."""
 
     def __init__(self, state: State, boundary: BoundaryConditions, step: int) -> None:
         self.state, self.boundary = state, boundary
@@ -100,7 +100,7 @@ class NewtonStep:
         self.elements = with_targets(self.prepared, filling)
         self.weight = self.prepared.body.mass[:, None] * boundary.gravity
         """m g of all nodes [N], (n, 3)."""
-        # Without gravity: a body at rest begins where it ends.
+        # The start is predicted without gravity, so that a body in equilibrium starts at its solution.
         self.p = self.nodes.x + boundary.dt * self.nodes.v
         held = self.model.held_nodes
         self.p[held] = self.model.held_rest + boundary.held_displacement[step][self.model.held_group]
@@ -115,7 +115,7 @@ class NewtonStep:
         end_stage(self.state.diagnostics.stage_times, stage)
 
     def take(self, ending: Ending) -> None:
-        """Passes until the last one moves nothing any more; then v⁺ = (x⁺ − x)/dt."""
+        """Makes passes until one moves no node by more than the tolerance; then v⁺ = (x⁺ − x)/dt."""
         boundary, diagnostics = self.boundary, self.state.diagnostics
         rows, impulses, count, settled = None, np.zeros(0), 0, False
         while not settled and count < ending.most and np.isfinite(self.p).all():
@@ -139,7 +139,8 @@ class NewtonStep:
         self.end_stage(INTEGRATION)
 
     def newton_pass(self) -> tuple[np.ndarray, Rows, np.ndarray, bool]:
-        """(δ [m], touched rows, their impulses γ [kg m], whether obstacles agree) of one linear step from p."""
+        """(δ [m], contact rows, their impulses γ [kg m], whether the touched set is final) of one linear step from
+        p."""
         for exact in (True, False):
             change, rows, impulses, agreed = self.linear_step(self.tangent(exact))
             if float(np.vdot(self.right + self.given(rows, impulses), change)) >= 0.0:
@@ -147,11 +148,11 @@ class NewtonStep:
         return change, rows, impulses, agreed
 
     def given(self, rows: Rows, impulses: np.ndarray) -> np.ndarray:
-        """What obstacles give [kg m], (n, 3)."""
+        """Impulses of the obstacles on the nodes times dt [kg m], (n, 3)."""
         return rows.pushes(impulses, self.p) + self.contact.friction_impulse
 
     def linear_step(self, tangent: Tangent) -> tuple[np.ndarray, Rows, np.ndarray, bool]:
-        """The same with a tangent that need not be positive."""
+        """The same with a given tangent, which need not be positive."""
         free = tangent.respond(self.right)
         self.end_stage(SPRINGS)
         obstacles = len(self.boundary.radius) > 0
@@ -168,7 +169,8 @@ class NewtonStep:
         return change, rows, impulses, agreed
 
     def tangent(self, exact: bool) -> Tangent:
-        """T at p with what friction resists; not `exact`: without what the pressure turns, so that it is positive."""
+        """T at p including the stiffness of friction. If not `exact`: without the geometric part of the pressure, so
+        that it is positive."""
         pattern, data = self.prepared.pattern, self.prepared.constant(self.state, self.boundary).copy()
         stiffen = self.prepared.law.add_stiffness
         stiffen(self.elements, pattern.places, self.p, self.boundary.dt**2, exact, data)
@@ -196,7 +198,8 @@ class NewtonStep:
         return right
 
     def potential(self, p: np.ndarray) -> tuple[float, float]:
-        """What the step makes smallest [kg m²], whose slope is minus the imbalance, and the size of its terms."""
+        """The potential that the step minimises [kg m²], whose gradient is minus the imbalance, and the sum of the
+        sizes of its terms."""
         model, dt, moved = self.model, self.boundary.dt, p - self.nodes.x
         mass = model.mass[:, None]
         inertia = 0.5 * (1.0 + self.boundary.damping * dt) * float((mass * moved * moved).sum())
@@ -206,7 +209,8 @@ class NewtonStep:
         return inertia - work + springs + volumes, inertia + abs(work) + abs(springs) + abs(volumes)
 
     def part_of(self, change: np.ndarray, given: np.ndarray) -> float:
-        """How much of a linear step is taken, 1, ½, …: the potential less what obstacles give must fall (eq. 13.7)."""
+        """Line search: the part of a linear step that is taken, 1, ½, …, so that the potential minus the work of
+        obstacles falls (eq. 13.7)."""
         begun, size = self.potential(self.p)
         slope = float(np.vdot(self.right + given, change))
         part = 1.0
@@ -218,11 +222,12 @@ class NewtonStep:
         return part
 
     def book_held(self) -> None:
-        """Impulses of attachments [N s] at the end of the step (eq. 3.6), and whether a volume had no gradient."""
+        """Records the impulses of attachments [N s] at the end of the step (eq. 3.6), and whether a volume had no
+        gradient."""
         self.imbalance()
         model, nodes, diagnostics = self.model, self.nodes, self.state.diagnostics
         diagnostics.singular[0] += self.idle
-        # Weight is that of the mass, whatever resists motion.
+        # Gravity acts on the mass of the body, not on the inertial mass.
         nodes.force[:] += self.weight - model.mass[:, None] * self.boundary.gravity
         push = Push(self.force, 1.0)
         add_held_impulse(model, nodes, push, self.boundary.dt, self.boundary.gravity, diagnostics.held_impulse)
@@ -230,10 +235,10 @@ class NewtonStep:
 
 
 def with_targets(prepared: Prepared, filling: np.ndarray) -> Elements:
-    """The elements with what the kept volumes want of their rest volumes, (m,)."""
+    """The elements with targets `filling` (m,) of the kept volumes over their rest volumes."""
     return prepared.elements._replace(target_ratio=target_ratios(prepared.body, filling))
 
 
 def missing(prepared: Prepared, x: np.ndarray, filling: np.ndarray) -> np.ndarray:
-    """What the elements around each kept volume lack of what they should have, over their rest volume [1], (m,)."""
+    """Target minus volume of each kept volume, over its rest volume [1], (m,)."""
     return filling - prepared.body.kept.measure(x) / prepared.body.rest_volumes

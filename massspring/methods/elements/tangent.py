@@ -14,7 +14,7 @@ from massspring.kernels.forces.elements import Elements, Places
 from massspring.methods.implicit.factor import constant_matrix
 
 OPTIONS: dict[str, Any] = {"diag_pivot_thresh": 0.0, "options": {"SymmetricMode": True}}
-"""Of a factor whose rows stay on the diagonal."""
+"""SuperLU options for a factor without row exchanges."""
 
 
 def elements_of(body: Body, bulk_modulus: float) -> Elements:
@@ -37,14 +37,15 @@ def elements_of(body: Body, bulk_modulus: float) -> Elements:
 
 
 def target_ratios(body: Body, filling: np.ndarray) -> np.ndarray:
-    """J* of the points of all elements [1], (k, q): kept volumes want `filling` (m,) of what they have at rest."""
+    """J* of the points of all elements [1], (k, q), from the targets `filling` (m,) of the kept volumes over their rest
+    volumes."""
     if isinstance(body.kept, PointVolumes):
         return filling[body.kept.corner_volume] @ BARYCENTRIC.T
     return filling[body.tetrahedra].mean(axis=1, keepdims=True)
 
 
 class Pattern:
-    """Which entries the stiffness of the free nodes has, nodes in the order of least degree."""
+    """The sparsity pattern of the stiffness of the free nodes, which are in minimum-degree order."""
 
     def __init__(self, elements: Elements, model: Model) -> None:
         n, cells = len(model.mass), elements.node
@@ -70,14 +71,14 @@ class Pattern:
         width = np.zeros(n, dtype=np.int64)
         width[self.free] = self._width
         self.diagonal = self._entries(np.arange(len(self.free)), np.arange(len(self.free)))
-        """Place among the data of the first entry of each node's own block, (f,)."""
+        """Index in the data of the first entry of the diagonal block of each node, (f,)."""
         self.places = Places(self._entries(rank[rows], rank[columns]).reshape(*cells.shape, -1), width)
 
     def _spans(self) -> list[tuple[int, int]]:
         return list(zip(self.graph.indptr[:-1].tolist(), self.graph.indptr[1:].tolist(), strict=True))
 
     def _entries(self, row: np.ndarray, column: np.ndarray) -> np.ndarray:
-        """Place among the data of the first entry of blocks (row, column), (b,) each; −1 where one is."""
+        """Index in the data of the first entry of blocks (row, column), (b,) each; −1 if one of the two is −1."""
         size, indptr = len(self.free), self.graph.indptr.astype(np.int64)
         keys = np.repeat(np.arange(size), np.diff(indptr)) * size + self.graph.indices
         place = np.searchsorted(keys, row * size + column)
@@ -103,9 +104,9 @@ class Pattern:
 
 
 class Tangent:
-    """T = (1 + c dt) M + dt² ∂²W/∂x² [kg] of the free nodes at one place, factored.
+    """T = (1 + c dt) M + dt² ∂²W/∂x² [kg] of the free nodes at given positions, factored.
 
-    Where numbers are lost, or no pivot is left, it answers NaN, and the run has diverged.
+    If entries are not finite, or a pivot is zero, solutions are NaN, and the run counts as diverged.
     """
 
     def __init__(self, pattern: Pattern, data: np.ndarray) -> None:
@@ -116,7 +117,7 @@ class Tangent:
         self._answers: dict[tuple[int, bytes], np.ndarray] = {}
 
     def respond(self, forces: np.ndarray) -> np.ndarray:
-        """T⁻¹ `forces`, (n, 3) each; held nodes stay."""
+        """T⁻¹ `forces`, (n, 3) each; 0 at held nodes."""
         moved = np.zeros_like(forces)
         moved[self.pattern.free] = self._solve(forces[self.pattern.free].ravel()).reshape(-1, 3)
         return moved
@@ -125,7 +126,8 @@ class Tangent:
         return np.full_like(right, np.nan) if self._factor is None else self._factor.solve(right)
 
     def columns(self, nodes: np.ndarray, directions: np.ndarray) -> np.ndarray:
-        """T⁻¹ of a unit force along each of `directions` (c, 3) at `nodes` (c,), (c, n, 3); each solved for once."""
+        """T⁻¹ of a unit force along each of `directions` (c, 3) at `nodes` (c,), (c, n, 3); each is solved for only
+        once."""
         keys = [(int(node), direction.tobytes()) for node, direction in zip(nodes, directions, strict=True)]
         new = [k for k, key in enumerate(keys) if key not in self._answers]
         if new:

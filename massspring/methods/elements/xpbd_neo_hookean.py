@@ -3,15 +3,15 @@
 Macklin and Müller, A constraint-based formulation of stable neo-Hookean materials, Motion, Interaction and Games 2021.
 Two constraints per tetrahedron have the energy of (13.1) on linear bodies (docs/theory.md, eq. 13.14): C_D = |F| with
 stiffness mu V and C_H = J − J* − mu/K with stiffness K V. A sweep corrects the predicted positions tetrahedron after
-tetrahedron (eq. 13.15). Both constraints of one are solved together, so that a body at rest stays there however few the
-sweeps are. The springs of the body give no force: the first constraint is in their place.
+tetrahedron (eq. 13.15). Both constraints of a tetrahedron are solved together, so that a body at rest stays at rest
+with any number of sweeps. The springs of the body give no force: the first constraint replaces them.
 
-The dial is sweeps × sub-steps: `iterations`, and the steps of a frame.
+Sweeps × sub-steps set the accuracy: `iterations`, and the steps of a frame.
 
-Limits: what the sweeps have not reached depends on their number and on the step, and the body is softer by it.
-Gradients are those of positions under way, so that spin is not kept, and long steps are not stable: a thrown block
-keeps its energy at one limit of the explicit springs, has forty times as much at five (fourteen with fifty sweeps) and
-is lost at twenty with either. Linear tetrahedra with a pressure each lock.
+Limits: the error of a finite number of sweeps depends on their number and on the step, and makes the body softer.
+Gradients are taken at intermediate positions, so angular momentum is not conserved, and long steps are not stable: a
+thrown block keeps its energy at one limit of the explicit springs, has forty times as much at five (fourteen with fifty
+sweeps) and is lost at twenty with either. Linear tetrahedra with one pressure each lock.
 """
 
 from dataclasses import dataclass, replace
@@ -41,14 +41,14 @@ from massspring.world.obstacles import Attachment
 
 
 class Constraints(NamedTuple):
-    """What a state remembers."""
+    """The memory of a state."""
 
     body: Body
     elements: Elements
     multiplier: np.ndarray
     """Of C_D and C_H [J], (k, 2); scratch."""
     y: np.ndarray
-    """Positions under way [m], (n, 3); scratch."""
+    """Intermediate positions [m], (n, 3); scratch."""
     push: np.ndarray
     """Force of all constraints [N], (n, 3)."""
 
@@ -117,7 +117,7 @@ class XpbdNeoHookean(Method):
         return reason
 
     def start(self, body: Body, attachments: tuple[Attachment, ...] = (), v: np.ndarray | None = None) -> State:
-        """The body at rest, or with velocities `v` (n, 3) [m/s], its springs without force."""
+        """The body at rest, or with velocities `v` (n, 3) [m/s], with springs that give no force."""
         elements = elements_of(body, self.bulk_ratio * body.rest_pressure)
         k, n = len(elements.node), body.node_count
         memory = Constraints(body, elements, np.zeros((k, 2)), np.zeros((n, 3)), np.zeros((n, 3)))
@@ -129,7 +129,7 @@ class XpbdNeoHookean(Method):
     def advance(self, state: State, boundary: BoundaryConditions) -> State:
         """One frame."""
         after, memory = begin_frame(state, boundary), state.memory
-        # The last forces tell where contact will be; the old state keeps its own.
+        # The forces of the last step are used to find contacts; a copy leaves those of the old state unchanged.
         push, body = memory.push.copy(), memory.body
         frame, volumes = after.frame(boundary), body.rest_volumes
         neo_hookean_frame(frame, memory.elements, volumes, memory.multiplier, memory.y, push, self.iterations)

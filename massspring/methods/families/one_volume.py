@@ -1,11 +1,12 @@
-"""One loop for the relatives of implicit constraint enforcement that keep one volume (docs/theory.md, section 10).
+"""The loop of all variants of implicit constraint enforcement that keep one volume (docs/theory.md, section 10).
 
-With ṽ, W̃ of eq. 3.4 every one of them ends a step at v⁺ = ṽ + dt lam W̃ G, x⁺ = x + dt v⁺. They differ in where G is
-taken, in how long the step along it is, and in whether a correction of the positions is felt by the velocities.
+With ṽ, W̃ of eq. 3.4 each of them ends a step at v⁺ = ṽ + dt lam W̃ G, x⁺ = x + dt v⁺. They differ in where G is taken,
+in the length of the step along it, and in whether a correction of the positions changes the velocities.
 
-A thin probe's contacts come after the multiplier and leave G·v⁺ as it is (eq. 11.6): what a rule asks of the rate of V
-stays true. An exact root is then true to first order in what the contacts move; the next step starts from the true V,
-so that nothing adds up. Nothing may move after that stage: a correction of the positions would not be looked at.
+Contacts of thin probes come after the multiplier and do not change G·v⁺ (eq. 11.6), so the condition of a rule on the
+rate of V still holds. An exact root then holds to first order in the motion by these contacts; the next step starts
+from the true V, so that errors do not accumulate. Nothing may move after that stage, since the search for crossings
+would miss a correction of the positions.
 """
 
 from dataclasses import replace
@@ -30,14 +31,14 @@ from massspring.methods.method import begin_frame
 
 
 class Rule(NamedTuple):
-    """The switches. As they stand: HCJ05."""
+    """The settings of a variant; the defaults are HCJ05."""
 
     pull: float = 1.0
-    """Share of V0 − V that a step makes up for, (beta dt)² [1]."""
+    """Share of V0 − V that a step corrects, (beta dt)² [1]."""
     brake: float = 1.0
     """Share of dV/dt that a step stops, 2 alpha dt [1]."""
     convective: bool = False
-    """Whether the change of G along the motion, vᵀ H v, enters."""
+    """Whether the convective term vᵀ H v, the change of G along the motion, is included."""
     exact: bool = False
     """Whether the step ends at V0 exactly, at the nearest root of the cubic, instead of at the linearised V0."""
     at_prediction: bool = False
@@ -48,7 +49,7 @@ class Rule(NamedTuple):
 
 @compiled
 def inertial_change(model, nodes, rule, dt):
-    """dt (1 − 2 alpha dt) G·v − dt² vᵀHv [m³], what a step leaves of the old change of volume (eq. 10.5)."""
+    """dt (1 − 2 alpha dt) G·v − dt² vᵀHv [m³], the part of the old change of volume that a step retains (eq. 10.5)."""
     change = 0.0
     if rule.brake != 1.0:
         for i in range(nodes.v.shape[0]):
@@ -64,9 +65,10 @@ def inertial_change(model, nodes, rule, dt):
 
 @compiled
 def linear_multiplier(model, nodes, contacts, error, kept, dt, whole):
-    """lam [Pa] and G·W̃·G of a step that makes up for `error` [m³] and stops `kept` [m³]; whether the error was cut.
+    """lam [Pa], G·W̃·G, and whether the error was limited, for a step that corrects `error` [m³] and retains the change
+    of volume `kept` [m³].
 
-    It is not where the `whole` of it is wanted (eq. 3.3, 8.5, 10.5).
+    With `whole` the error is not limited (eq. 3.3, 8.5, 10.5).
     """
     lam, mobility = volume_multiplier(nodes, contacts, model.inverse_mass, error + kept, dt)
     lightest, longest = model.largest_inverse_mass, model.correction_limit
@@ -80,8 +82,8 @@ def linear_multiplier(model, nodes, contacts, error, kept, dt, whole):
 
 @compiled
 def exact_multiplier(model, nodes, contacts, line, target, mobility, dt):
-    """lam [Pa] with V(y + lam d) = V0, the root of smallest modulus (eq. 10.1, 10.2), and G·W̃·G; (0, 0) without
-    one."""
+    """lam [Pa] with V(y + lam d) = V0, the root of smallest modulus (eq. 10.1, 10.2), and G·W̃·G; (0, 0) without a
+    root."""
     line_into(nodes, contacts, model.inverse_mass, dt, line)
     volume, k1, k2, k3 = volume_cubic(line.y, line.d, model.triangles)
     lam = nearest_root(volume - target, k1, k2, k3)
@@ -99,7 +101,7 @@ def predicted_gradient_into(model, nodes, line, dt):
 
 @compiled
 def correct_positions(model, nodes, contacts, target, dt):
-    """x += W̃ G (V0 − V)/(G·W̃·G), G at x, velocities untouched (eq. 10.7); whether the correction was cut
+    """x += W̃ G (V0 − V)/(G·W̃·G), G at x, velocities unchanged (eq. 10.7). Returns whether the correction was limited
     (eq. 8.5)."""
     error = target - volume_gradient_into(nodes.x, model.triangles, nodes.gradient)
     _, mobility = volume_multiplier(nodes, contacts, model.inverse_mass, error, dt)

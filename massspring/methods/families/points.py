@@ -1,4 +1,4 @@
-"""The frame of bodies whose volumes are summed over points of quadratic elements (HCJ05 with many volumes)."""
+"""The frame loop for bodies whose volumes are summed over points of quadratic elements (HCJ05 with many volumes)."""
 
 import math
 from typing import NamedTuple
@@ -35,11 +35,11 @@ from massspring.kernels.step.touching_faces import begin_pairs, contacts_stand, 
 
 @by_address
 class SpringFactor(NamedTuple):
-    """Springs without length taken at the end of the step: A = (1 + c dt) M + dt² K, factored once (eq. 12.5)."""
+    """Springs without length, implicit in time: A = (1 + c dt) M + dt² K, factored once (eq. 12.5)."""
 
     factor: Triangular
     start: np.ndarray
-    """Where the entries of each free node begin in the next two, (n + 1,) uint32."""
+    """First entry of each free node in `column` and `value`, (n + 1,) uint32."""
     column: np.ndarray
     """Held neighbours, (e,) uint32."""
     value: np.ndarray
@@ -48,7 +48,7 @@ class SpringFactor(NamedTuple):
 
 @njit_inlined
 def take_springs_implicitly(frame, rows, implicit):
-    """v* = A⁻¹ (M (v*₀ + c dt v) − dt² K_h v_h), of the v*₀ that an explicit step predicts (eq. 12.5)."""
+    """v* = A⁻¹ (M (v*₀ + c dt v) − dt² K_h v_h) from the prediction v*₀ of an explicit step (eq. 12.5)."""
     model, nodes, dt, field = frame.model, frame.nodes, frame.boundary.dt, rows.field
     keep = frame.boundary.damping * dt
     for i in range(field.shape[0]):
@@ -63,7 +63,7 @@ def take_springs_implicitly(frame, rows, implicit):
 
 @njit_inlined
 def respond_of_free(model, nodes, implicit, rows):
-    """A⁻¹ of `rows.field` into v* of the free nodes."""
+    """Writes A⁻¹ `rows.field` to v* of the free nodes."""
     respond_into(implicit.factor, rows.field, rows.moved)
     for i in range(rows.moved.shape[0]):
         if model.inverse_mass[i] > 0.0:
@@ -73,7 +73,8 @@ def respond_of_free(model, nodes, implicit, rows):
 
 @njit_inlined
 def meet_points(frame, step, push, rows, implicit):
-    """Contact inside facets, as known forces, or of nodes (eq. 3.7, 9.3–9.5); the most passes of the active set."""
+    """Contact inside facets, with forces of the last step, or at nodes (eq. 3.7, 9.3–9.5). Returns the most passes of
+    the active set."""
     facets, boundary, model, nodes = rows.facets, frame.boundary, frame.model, frame.nodes
     if facets.node.shape[0] == 0:
         return search_contacts(frame, step, push)
@@ -90,9 +91,10 @@ def meet_points(frame, step, push, rows, implicit):
 
 @njit_lean
 def point_volumes_frame(frame, rows, implicit, accuracy, pairs):
-    """One frame with one volume per vertex (eq. 3.1–3.8, 8.3–8.5, 8.8–8.13); `rows.lam` [Pa] comes in and goes out.
+    """One frame with one volume per vertex (eq. 3.1–3.8, 8.3–8.5, 8.8–8.13); `rows.lam` [Pa] holds the multipliers on
+    entry and exit.
 
-    `implicit`: springs taken at the end of the step, or None. `pairs`: faces of a cut that may touch, or None.
+    `implicit`: the factor of implicit springs, or None. `pairs`: faces of a cut that may touch, or None.
     """
     model, nodes, boundary, diagnostics = frame.model, frame.nodes, frame.boundary, frame.diagnostics
     push, limited, idle = Push(rows.push, 1.0), False, False
@@ -127,7 +129,7 @@ def point_volumes_frame(frame, rows, implicit, accuracy, pairs):
 
 @njit_inlined
 def end_implicitly(frame, rows, implicit):
-    """v⁺ = v* + dt A⁻¹ F and x⁺ (eq. 3.5, 12.5); books what attachments give."""
+    """v⁺ = v* + dt A⁻¹ F and x⁺ (eq. 3.5, 12.5); adds the impulses of attachments."""
     model, nodes, boundary, diagnostics = frame.model, frame.nodes, frame.boundary, frame.diagnostics
     add_held_impulse(model, nodes, Push(rows.push, 1.0), boundary.dt, boundary.gravity, diagnostics.held_impulse)
     end_stage(diagnostics.stage_times, HELD)

@@ -1,9 +1,10 @@
-"""One loop for methods whose pressure is a function of the volume now, and acts as one more force.
+"""The loop of methods whose pressure is a function of the current volume and acts as one more force.
 
-A penalty is bounded by its modulus, a gas without room is not: it bursts, and the run has diverged. Cut off like a
-correction of constraints it would come back, but steps beyond the limit would rattle under the cut and seem stable. A
-surface without gradient is not pushed at all.
-Contact and held nodes see it as `free` sees its springs: nothing is solved (docs/theory.md, eq. 10.8, 10.9).
+The pressure of a penalty is bounded by its modulus. That of a gas grows without bound as its volume goes to 0: the body
+bursts, and the run diverges. If the pressure were limited like the correction of a constraint, the body would recover,
+but steps beyond the stability limit would oscillate under that bound and seem stable. A surface without gradient is not
+pushed. Contact and held nodes treat the pressure as a spring force, as in `free`: nothing is solved for
+(docs/theory.md, eq. 10.8, 10.9).
 """
 
 from dataclasses import replace
@@ -28,7 +29,7 @@ PENALTY, GAS, PYRAMIDS = 0, 1, 2
 
 @compiled
 def pressure_now(model, nodes, bulk_modulus, law, volume, target):
-    """lam [Pa] of the volume now (eq. 10.8, 10.10)."""
+    """lam [Pa] of the current volume (eq. 10.8, 10.10)."""
     if law == GAS:
         return bulk_modulus * (target / volume - 1.0) if volume > 0.0 else np.inf
     if law == PYRAMIDS:
@@ -51,7 +52,7 @@ def pressure_frame(frame, bulk_modulus, law):
         end_stage(diagnostics.stage_times, VOLUME)
         pressed = Push(nodes.gradient, lam)
         search_contacts(frame, step, pressed)
-        # The pressure is a force that no contact changes: no mobility.
+        # Contact does not change the pressure, so the mobility is 0.
         end_step(frame, step, pressed, 0.0, None)
     return lam
 
@@ -76,6 +77,6 @@ def volume_stiffness(body: Body, bulk_modulus: float) -> csr_array:
 
 
 def check_modulus(method: str, name: str, value: float, unit: str = "Pa") -> None:
-    """Raises MassSpringError for a modulus, in some unit, that is not positive and finite."""
+    """Raises MassSpringError for a modulus `value` [`unit`] that is not positive and finite."""
     if not 0.0 < value < float("inf"):
         raise MassSpringError(f"{method}'s {name} is {value} {unit}; it must be positive and finite")

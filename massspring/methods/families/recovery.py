@@ -1,8 +1,9 @@
-"""How a body with several volumes comes back from any shape: until then it is the paper's (docs/theory.md, eq. 8.15).
+"""Recovery of a body with several volumes from any start: meanwhile it has the springs and the one volume of the paper
+(docs/theory.md, eq. 8.15).
 
-Several volumes are met by shapes in which tetrahedra are inside out and make up for each other, and springs with the
-volumes hold such folds. Springs with rest length and one volume (JHC05) hold nearly none: they take the body until no
-tetrahedron is far from its volume, and leave it to its own springs and volumes then, with its places and speeds.
+Shapes with inverted tetrahedra that compensate each other can satisfy several volumes, and springs and volumes together
+hold such folds. Springs with rest length and one volume (JHC05) hold hardly any. They act until every tetrahedron has
+nearly its rest volume; then the springs and volumes of the body take over its positions and velocities.
 """
 
 import math
@@ -21,40 +22,42 @@ from massspring.world.obstacles import Attachment
 from massspring.world.targets import fastest_filling
 
 LEAST, MOST = 0.5, 2.0
-"""Volumes of tetrahedra over those at rest [1] between which the body is back: far from both 0 and its own motion."""
+"""Range of volume over rest volume of all tetrahedra [1] in which the body counts as recovered: away from 0 and wider
+than in normal motion."""
 SOFTER = 0.25
-"""Stiffness of the springs against those that oscillate as fast as the body at rest: a network that is drawn out has
-twice the largest ω² it has at rest (2.07 in a ball), and the pressure of a wrong volume adds to it."""
+"""Stiffness of the springs over that with which they would oscillate as fast as the body at rest. A stretched network
+has twice the largest ω² that it has at rest (2.07 in a ball), and the pressure of a volume error adds to it."""
 SLOW, THROWN = 0.03, 1.0
-"""Speeds over that of a shear wave [1]: below the first a body that is not back is stuck; with the second it is thrown
-about, and each later time with as much more."""
+"""Speeds over that of a shear wave [1]. Below SLOW a body that has not recovered counts as stuck; it then gets random
+velocities of size THROWN, increased by THROWN each further time."""
 
 
 @dataclass(frozen=True, eq=False)
 class Recovery:
-    """What a method remembers of a body that is not back yet."""
+    """The memory of a method for a body that has not recovered yet."""
 
     simple: State
-    """The same nodes with springs of rest length and one volume."""
+    """State of the substitute body: the same nodes with springs that have a rest length, and one volume."""
     tetrahedra: np.ndarray
     """(k, 4) uint32."""
     rest_volumes: np.ndarray
     """Of the tetrahedra [m³], (k,)."""
     parts: np.ndarray
-    """What each kept volume has in the one, (m,)."""
+    """Factor of each kept volume in the one volume, (m,)."""
     wave: float
     """Speed of a shear wave [m/s]."""
     throws: int = 0
-    """How often the body was stuck."""
+    """How often the body has been stuck."""
 
 
 def why_not_recover(body: Body) -> str | None:
-    """Why it cannot be decided whether `body` has recovered; None when it can."""
+    """Why recovery of `body` cannot be checked; None if it can."""
     return None if len(body.tetrahedra) else "it is back when its tetrahedra are, the body has none; fill its mesh"
 
 
 def recovery_of(body: Body, attachments: tuple[Attachment, ...], v: np.ndarray | None) -> Recovery:
-    """Of a body at rest, or with velocities `v` (n, 3) [m/s]. Raises MassSpringError for bad attachments."""
+    """The recovery of a body at rest, or with velocities `v` (n, 3) [m/s]. Raises MassSpringError for bad
+    attachments."""
     simple = simple_body(body)
     kept = body.kept
     parts = np.ones(1) if keeps_one(kept) else kept.parts_of(body.triangles)
@@ -63,7 +66,8 @@ def recovery_of(body: Body, attachments: tuple[Attachment, ...], v: np.ndarray |
 
 
 def simple_body(body: Body) -> Body:
-    """The same nodes with one volume, and springs with rest length that allow the step that `body` allows."""
+    """The substitute body: the same nodes with one volume, and springs with rest length that allow the same step as
+    `body`."""
     springs = body.springs
     if body.rest_pressure:
         tissue = Material(body.rest_pressure, 1.0)
@@ -81,13 +85,14 @@ def simple_body(body: Body) -> Body:
 
 
 def is_back(recovery: Recovery, x: np.ndarray) -> bool:
-    """Whether every tetrahedron of nodes at `x` (n, 3) [m] has about its volume."""
+    """Whether every tetrahedron has between LEAST and MOST of its rest volume with nodes at `x` (n, 3) [m]."""
     ratio = tetrahedron_volumes(x, recovery.tetrahedra) / recovery.rest_volumes
     return bool(ratio.min() > LEAST and ratio.max() < MOST)
 
 
 def simpler(state: State, recovery: Recovery, boundary: BoundaryConditions) -> tuple[State, BoundaryConditions]:
-    """The body of one volume where `state` is, and that frame for it."""
+    """The substitute body at the positions and velocities of `state`, and the boundary conditions of the frame for
+    it."""
     simple = recovery.simple
     nodes = simple.nodes._replace(x=state.nodes.x, v=state.nodes.v)
     one = np.ascontiguousarray((boundary.volume_target @ recovery.parts)[:, None])
@@ -95,9 +100,10 @@ def simpler(state: State, recovery: Recovery, boundary: BoundaryConditions) -> t
 
 
 def followed_by(state: State, recovery: Recovery, simple: State, steps: int) -> State:
-    """`state` where the body of one volume ended a frame of so many steps, thrown about if that is stuck.
+    """`state` with positions and velocities of the substitute body after a frame of `steps` steps; if that is stuck,
+    with random velocities added.
 
-    The steps count as limited: the volumes were kept as one.
+    The steps count as limited, since only the one volume was kept.
     """
     throws, nodes = recovery.throws, state.nodes._replace(x=simple.nodes.x, v=simple.nodes.v)
     if _is_stuck(simple, recovery.wave):
@@ -109,14 +115,14 @@ def followed_by(state: State, recovery: Recovery, simple: State, steps: int) -> 
 
 
 def _is_stuck(state: State, wave: float) -> bool:
-    """Whether the volume has nothing to push on, or the body has come to rest apart from a common motion."""
+    """Whether the volume has no gradient, or the body is at rest except for a translation."""
     v = state.nodes.v
     fastest = math.sqrt(float(((v - v.mean(axis=0)) ** 2).sum(axis=1).max()))
     return state.diagnostics.singular[0] > 0 or fastest < SLOW * wave
 
 
 def _thrown(state: State, speed: float, seed: int) -> np.ndarray:
-    """Velocities [m/s] with noise of size `speed` at free nodes that leaves their momentum as it is, (n, 3)."""
+    """Velocities [m/s], (n, 3), with noise of size `speed` added at free nodes, without a change of their momentum."""
     free, mass = state.model.inverse_mass > 0.0, state.model.mass
     noise = speed * np.random.default_rng(seed).standard_normal(state.nodes.v.shape)
     noise[~free] = 0.0

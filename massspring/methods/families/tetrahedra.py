@@ -1,4 +1,4 @@
-"""What methods on tetrahedra share: their arrays, and the loop of known pressures."""
+"""Common parts of methods on tetrahedra: their arrays, and the loop with an explicit pressure per cell."""
 
 from dataclasses import replace
 
@@ -51,7 +51,7 @@ def cell_stiffness(body: Body, slopes: np.ndarray, weight: np.ndarray) -> csr_ar
 
 @njit_lean
 def cells_frame(frame, cells, bulk_modulus, barycentric):
-    """One frame of symplectic Euler with a known pressure in every cell (eq. 3.1, 3.2, 3.5, 3.7, 10.11, 10.12)."""
+    """One frame of symplectic Euler with an explicit pressure in every cell (eq. 3.1, 3.2, 3.5, 3.7, 10.11, 10.12)."""
     nodes, boundary, diagnostics = frame.nodes, frame.boundary, frame.diagnostics
     nothing = Push(nodes.gradient, 0.0)
     open_frame(frame)
@@ -71,7 +71,7 @@ def cells_frame(frame, cells, bulk_modulus, barycentric):
 
 
 def own_cells(state: State) -> Cells:
-    """The state's cells, what they remember copied, so that a frame leaves the old state as it was."""
+    """The cells of the state with a copy of their memory, so that a frame does not change the old state."""
     return state.memory._replace(pressure=state.memory.pressure.copy(), filling=state.memory.filling.copy())
 
 

@@ -1,4 +1,4 @@
-"""Contact of long steps: which nodes obstacles hold in which directions, and what that takes (eq. 3.8, 12.3, 12.4)."""
+"""Contact for long steps: the directions that obstacles remove from nodes, and their impulses (eq. 3.8, 12.3, 12.4)."""
 
 import numpy as np
 from scipy.linalg import get_lapack_funcs
@@ -12,12 +12,12 @@ from massspring.methods.implicit.factor import Factor
 
 FACTORED, SOLVED = get_lapack_funcs(("potrf", "potrs"), dtype=np.float64)
 SLIP_RESOLUTION = 1e-11
-"""Over the longest correction, 0.3 of an edge: a node that slides less than that in a step does not slide. Solves leave
-1e-15 to 1e-14 of it where a node sticks (measured), and friction would take its direction from that."""
+"""Slip in a step, over the correction limit of 0.3 of an edge, below which a node does not slide. A sticking node has a
+measured slip of 1e-15 to 1e-14 from round-off of the solve, which must not set the direction of friction."""
 
 
 class TouchedRows:
-    """The directions that obstacles take in a step, as rows C of unit vectors at nodes."""
+    """The directions that obstacles remove in a step, as rows C of unit vectors at nodes."""
 
     def __init__(self, nodes: Nodes, contacts: Contacts, surface_nodes: np.ndarray, dt: float) -> None:
         mode = contacts.mode[surface_nodes]
@@ -31,7 +31,7 @@ class TouchedRows:
         second = len(slides) + len(on_edge) + np.arange(len(on_edge))
         self.obstacle[second] = contacts.second[on_edge].astype(np.int64) - 1
         self.place = np.einsum("ci,ci->c", self.direction, nodes.x[self.nodes] + dt * contacts.v_target[self.nodes])
-        """Where each row ends the step, along its direction [m], (c,)."""
+        """Coordinate along its direction at which each row ends the step [m], (c,)."""
 
     def along(self, field: np.ndarray) -> np.ndarray:
         """C u, (c,)."""
@@ -39,7 +39,7 @@ class TouchedRows:
 
 
 class ActiveSet(TouchedRows):
-    """The rows of the moment and their Schur complement, where the components of a response do not couple."""
+    """The current rows and their Schur complement, for a response that does not couple the three components."""
 
     def __init__(self, factor: Factor, nodes: Nodes, contacts: Contacts, surface_nodes: np.ndarray, dt: float) -> None:
         super().__init__(nodes, contacts, surface_nodes, dt)
@@ -47,7 +47,7 @@ class ActiveSet(TouchedRows):
             self._columns = factor.columns(self.nodes)
             schur = self._columns[:, self.nodes] * (self.direction @ self.direction.T)
             self._root, broken = FACTORED(schur, clean=0)
-            if broken:  # C A⁻¹ Cᵀ is positive definite unless numbers are lost: then the run must end
+            if broken:  # C A⁻¹ Cᵀ is positive definite unless entries are not finite; then the run must end
                 self._root[:] = np.nan
 
     def impulses(self, missing: np.ndarray) -> np.ndarray:
@@ -66,7 +66,7 @@ class ActiveSet(TouchedRows):
 
 
 class Contact:
-    """The touched nodes of one step on their way to an active set."""
+    """The touched nodes of one step and the iteration for the active set."""
 
     def __init__(
         self,
@@ -77,19 +77,19 @@ class Contact:
         step: int,
         closer: float = 0.0,
     ) -> None:
-        """`closer` [m]: obstacles reach so much farther at first, to find nodes that lie on them but for round-off."""
+        """`closer` [m]: obstacles are enlarged by this at first, to find nodes that lie on them within round-off."""
         self.model, self.nodes, self.contacts = model, nodes, contacts
         self.boundary, self.step = boundary, step
         self.friction_impulse = np.zeros_like(nodes.x)
-        """Friction of the nodes that slip, times dt² [kg m], (n, 3)."""
+        """Friction force on the nodes that slip, times dt² [kg m], (n, 3)."""
         release_all(contacts)
         self.boundary = _nearer(boundary, closer) if closer else boundary
         self._activate(np.empty(0, dtype=np.int64), nodes.v)
         self.boundary = boundary
 
     def revise(self, end: np.ndarray, active: TouchedRows, impulses: np.ndarray) -> bool:
-        """Releases nodes that an obstacle would pull, activates those that would enter one, and lets slip those that
-        would stick too hard; whether any was (eq. 3.8, 12.4)."""
+        """Releases nodes that an obstacle would pull, activates those that would enter one, and makes sticking nodes
+        slip beyond the friction limit. Returns whether anything changed (eq. 3.8, 12.4)."""
         contacts, nodes = self.contacts, active.nodes
         pushes = np.zeros_like(end)
         np.add.at(pushes, nodes, impulses[:, None] * active.direction)
@@ -103,7 +103,8 @@ class Contact:
         return bool(len(leaving) or slipped or entered)
 
     def _let_slip(self, pushes: np.ndarray) -> int:
-        """Nodes that stick although that asks for more than mu times their normal part slip from now on (eq. 12.4)."""
+        """Makes sticking nodes slip whose tangential impulse exceeds mu times the normal one; returns how many (eq.
+        12.4)."""
         contacts = self.contacts
         nodes = np.flatnonzero(contacts.mode == STICKS)
         friction = self.boundary.friction[contacts.contact_id[nodes].astype(np.int64) - 1]
@@ -120,8 +121,8 @@ class Contact:
         return len(nodes)
 
     def apply_friction(self, end: np.ndarray, active: TouchedRows, impulses: np.ndarray) -> bool:
-        """Friction against the slip of the last pass; a node that it would drive sticks: whether one does
-        (eq. 12.4)."""
+        """Sets friction opposite to the slip of the last pass; a node that friction would push backwards sticks.
+        Returns whether one does (eq. 12.4)."""
         boundary = self.boundary
         if not boundary.rough:
             return False
@@ -137,7 +138,7 @@ class Contact:
         return bool(driven.any())
 
     def book(self, active: TouchedRows, impulses: np.ndarray, given: np.ndarray) -> None:
-        """Adds what obstacles give, impulses [N s], to `given` (o, 3)."""
+        """Adds the impulses of obstacles [N s] to `given` (o, 3)."""
         np.add.at(given, active.obstacle, impulses[:, None] / self.boundary.dt * active.direction)
         if self.boundary.rough:
             slipping = np.flatnonzero(self.friction_impulse.any(axis=1))
@@ -145,28 +146,29 @@ class Contact:
             np.add.at(given, obstacle, self.friction_impulse[slipping] / self.boundary.dt)
 
     def meet(self, nodes: np.ndarray, carried: np.ndarray) -> None:
-        """Nodes that come to a rough obstacle stick at first."""
+        """Nodes that reach a rough obstacle stick at first."""
         self.stick(nodes, carried)
 
     def rubbed(self, active: TouchedRows) -> np.ndarray:
-        """Which rows are those of nodes that slide on a rough obstacle, (c,) bool."""
+        """Which rows belong to nodes that slide on a rough obstacle, (c,) bool."""
         return (self.contacts.mode[active.nodes] == SLIDES) & (self.boundary.friction[active.obstacle] > 0.0)
 
     def slip(self, end: np.ndarray, nodes: np.ndarray) -> np.ndarray:
-        """Speed of touched `nodes` (c,) past their obstacles in a step that ends at `end` (n, 3) [m/s], (c, 3)."""
+        """Slip velocity of touched `nodes` (c,) on their obstacles in a step that ends at `end` (n, 3) [m/s], (c,
+        3)."""
         contacts, boundary = self.contacts, self.boundary
         carried = boundary.velocity[self.step][contacts.contact_id[nodes].astype(np.int64) - 1]
         return _aside((end[nodes] - self.nodes.x[nodes]) / boundary.dt - carried, contacts.normal[nodes])
 
     def stick(self, nodes: np.ndarray, carried: np.ndarray) -> None:
-        """Nodes move along with what they touch, `carried` [m/s]."""
+        """Makes nodes move with the velocity `carried` [m/s] of their obstacle."""
         contacts = self.contacts
         contacts.mode[nodes] = STICKS
         contacts.v_target[nodes] += _aside(carried, contacts.normal[nodes])
         self.friction_impulse[nodes] = 0.0
 
     def _activate(self, leaving: np.ndarray, velocity: np.ndarray) -> int:
-        """Activates nodes that `velocity` carries into an obstacle, but for those just let go; how many."""
+        """Activates nodes that `velocity` moves into an obstacle, except those just released; returns how many."""
         contacts, boundary = self.contacts, self.boundary
         if not len(boundary.radius):
             return 0
@@ -193,5 +195,5 @@ def _nearer(boundary: BoundaryConditions, length: float) -> BoundaryConditions:
 
 
 def _aside(vectors: np.ndarray, normal: np.ndarray) -> np.ndarray:
-    """What vectors (c, 3) have at right angles to unit normals (c, 3)."""
+    """The part of vectors (c, 3) orthogonal to unit normals (c, 3)."""
     return vectors - np.einsum("ci,ci->c", vectors, normal)[:, None] * normal

@@ -1,7 +1,7 @@
 """A constant matrix, factored once: A = (1 + c dt) M + dt² Σ_e k_e (e_i − e_j)(e_i − e_j)ᵀ, n × n (eq. 12.1).
 
-Every spring takes its full stiffness in every direction, so the three components do not couple: three right-hand
-sides. A is positive definite also where single weights of a cotangent network are negative.
+Every spring has its full stiffness in every direction, so the three components do not couple and are three right-hand
+sides. A is positive definite even if single weights of a cotangent network are negative.
 """
 
 import numpy as np
@@ -20,7 +20,7 @@ class Factor:
         n, matrix = len(model.mass), constant_matrix(model, dt, damping)
         free = np.flatnonzero(model.inverse_mass > 0.0)
         self.diagonal = np.where(model.inverse_mass > 0.0, matrix.diagonal(), np.inf)
-        """Of A [kg], (n,); inf where held."""
+        """Diagonal of A [kg], (n,); inf at held nodes."""
         self._triangular = triangular(matrix.tocsr()[free][:, free].tocsc(), free)
         self._place = np.full(n, -1)
         self._columns = np.empty((0, n))
@@ -33,14 +33,14 @@ class Factor:
         return moved
 
     def alone(self, rows: VolumeRows) -> tuple[np.ndarray, np.ndarray]:
-        """Σ_j |J_rj|²/A_jj [m⁴/kg] and max_j |J_rj|/A_jj [m²/kg], (m,): how a volume answers its pressure, and how far
-        the node that moves most does, where each node is alone."""
+        """Σ_j |J_rj|²/A_jj [m⁴/kg] and max_j |J_rj|/A_jj [m²/kg], (m,): response of a volume to its pressure, and
+        largest displacement of a node, with the diagonal of A only."""
         begin, square = rows.row_start[:-1].astype(np.int64), (rows.value**2).sum(axis=1)
         stiff = self.diagonal[rows.column]
         return np.add.reduceat(square / stiff, begin), np.maximum.reduceat(np.sqrt(square) / stiff, begin)
 
     def columns(self, nodes: np.ndarray) -> np.ndarray:
-        """A⁻¹ e_i of each of `nodes` (c,), as rows, (c, n); a node's is solved for when it is first touched."""
+        """A⁻¹ e_i of each of `nodes` (c,), as rows, (c, n); that of a node is solved for when it is first touched."""
         new = np.unique(nodes[self._place[nodes] < 0])
         self._make_room(len(new))
         for three in (new[k : k + 3] for k in range(0, len(new), 3)):
@@ -53,7 +53,7 @@ class Factor:
         return self._columns[self._place[nodes]]
 
     def _make_room(self, count: int) -> None:
-        """Doubles the store of columns until `count` more fit."""
+        """Doubles the storage of columns until `count` more fit."""
         while self._count + count > len(self._columns):
             more = np.empty((max(64, len(self._columns)), len(self._place)))
             self._columns = np.concatenate([self._columns, more])
@@ -73,7 +73,7 @@ def triangular(matrix: csc_array, nodes: np.ndarray) -> Triangular:
     """L D Lᵀ of a positive definite matrix whose columns belong to `nodes`, ordered by least degree."""
     options = {"SymmetricMode": True}
     factor = splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
-    assert np.array_equal(factor.perm_r, factor.perm_c)  # without a threshold no row leaves the diagonal
+    assert np.array_equal(factor.perm_r, factor.perm_c)  # with a threshold of 0 rows are not exchanged
     below = csc_array(tril(factor.L, -1))
     below.sort_indices()
     return Triangular(
@@ -87,7 +87,7 @@ def triangular(matrix: csc_array, nodes: np.ndarray) -> Triangular:
 
 
 class Factors:
-    """The factors of a run: one for each step length and damping it has seen."""
+    """The factors of a run, one for each step length and damping in use."""
 
     def __init__(self) -> None:
         self._factors: dict[tuple[float, float], Factor] = {}

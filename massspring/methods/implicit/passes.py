@@ -1,5 +1,5 @@
-"""One step of implicit springs: passes from the prediction to where springs, volumes, obstacles agree
-(eq. 12.2–12.4)."""
+"""One step of implicit springs: passes from the prediction to equilibrium of springs, volumes and obstacles (eq.
+12.2–12.4)."""
 
 import math
 
@@ -27,18 +27,18 @@ from massspring.methods.implicit.contact import ActiveSet, Contact
 from massspring.methods.implicit.factor import Factor
 
 CONTACT_REVISIONS, LAST_REVISIONS = 3, 12
-"""Of the touched set in one pass, and in the last one, after which no other pass finds a node that enters or is pulled.
-The last solution always belongs to the set that is applied."""
+"""Most revisions of the touched set in one pass, and in the last pass, after which no other pass corrects the set. The
+last solution always belongs to the set that is applied."""
 NEGLIGIBLE_RESPONSE = 1e-12
-"""Contact and held nodes that leave a volume this little of its response leave nothing but round-off."""
+"""Share of its response without contact below which the response of a volume counts as round-off."""
 
 SOFTNESS = 1e-10
-"""Relative compliance of volumes that are solved for densely: where some depend on others S stays regular; the next
-pass sees what it leaves."""
+"""Relative compliance added in a dense solve, so that S is regular if some volumes depend on others; the next pass
+corrects the residual."""
 
 
 class Step:
-    """One step in the making; arrays of the state are its scratch."""
+    """One step during its computation; arrays of the state serve as scratch."""
 
     def __init__(
         self, state: State, boundary: BoundaryConditions, step: int, factor: Factor, accuracy: Accuracy
@@ -47,17 +47,19 @@ class Step:
         self.boundary, self.step, self.factor, self.accuracy = boundary, step, factor, accuracy
         self.model, self.nodes, self.contacts = state.model, state.nodes, state.contacts
         self.rows, self.diagnostics = state.rows, state.diagnostics
-        # Without gravity: passes that start from balance must stay there, or a sum of few would be biased.
+        # The start is predicted without gravity: passes that start in equilibrium must stay there, or few passes would
+        # be biased.
         self.p = self.nodes.x + boundary.dt * self.nodes.v
         held = self.model.held_nodes
         self.p[held] = self.model.held_rest + boundary.held_displacement[step][self.model.held_group]
         self.few = len(self.rows.lam) <= DENSE_UP_TO
         self.target = boundary.volume_target[step]
-        """What the volumes are to be at the end of the step [m³], (m,); nearer to what they are where that is far."""
+        """Targets of the volumes at the end of the step [m³], (m,); nearer to the current volumes if these are far
+        off."""
         self.far_off = False
-        """Whether a volume is so far off that only a part of it is made up for."""
+        """Whether the error of a volume is so large that only part of it is corrected."""
         self.idle = False
-        """Whether a volume has had nothing to push on."""
+        """Whether a volume had no gradient."""
         self.contact = Contact(self.model, self.nodes, self.contacts, boundary, step)
         self.answers: np.ndarray | None = None
 
@@ -78,7 +80,7 @@ class Step:
         end_stage(self.diagnostics.stage_times, stage)
 
     def take(self, passes: int) -> None:
-        """So many passes; then v⁺ = (x⁺ − x)/dt."""
+        """Makes `passes` passes; then v⁺ = (x⁺ − x)/dt."""
         rows_into(self.nodes.x, self.model.inverse_mass, self.rows)
         begun = self.rows.volume.copy()
         active, impulses = self.active_set(), np.zeros(0)
@@ -103,7 +105,7 @@ class Step:
             self.p += change
             self.rows.lam[:] += self.rows.search
             if self.far_off:
-                break  # the pressure of one linear step along J where it began says nothing about J where it ended
+                break  # the pressure of a single linear step refers to J at its start, not to J at its end
         self.diagnostics.singular[0] += self.idle
         self.book(active, impulses)
         self.end_stage(HELD)
@@ -112,7 +114,7 @@ class Step:
         self.end_stage(INTEGRATION)
 
     def revised(self, free: np.ndarray, active: ActiveSet, most: int) -> tuple[np.ndarray, np.ndarray, ActiveSet]:
-        """Change of the positions, impulses and the active set they belong to, after at most so many solves."""
+        """Change of the positions, contact impulses, and the active set of both, after at most `most` solves."""
         change, impulses = self.solve(free, active)
         self.end_stage(MULTIPLIER)
         for _ in range(most - 1):
@@ -126,7 +128,7 @@ class Step:
         return change, impulses, active
 
     def active_set(self) -> ActiveSet:
-        """The touched nodes of the moment, and how volumes answer their pressures past them."""
+        """The current active set; also updates the response of volumes to their pressures with these contacts."""
         active = ActiveSet(self.factor, self.nodes, self.contacts, self.model.surface_nodes, self.boundary.dt)
         if self.answers is not None:
             self.reach(active)
@@ -143,8 +145,8 @@ class Step:
         self.schur = np.column_stack([self.times(field) for field in self.reached])
 
     def cap(self, begun: np.ndarray) -> None:
-        """Cuts what the step makes up for of volumes that are `begun` (m,) [m³] at its start: each alone moves no node
-        farther than 0.3 L by it (eq. 8.5)."""
+        """Limits the correction in this step of volumes that are `begun` (m,) [m³] at its start, so that each by itself
+        moves no node farther than 0.3 L (eq. 8.5)."""
         if self.few:
             gained, moved = np.diag(self.schur), np.linalg.norm(self.reached, axis=2).max(axis=1)
         else:
@@ -158,7 +160,7 @@ class Step:
         self.target = np.where(cut, begun + np.clip(error, -most, most), self.target)
 
     def imbalance(self) -> np.ndarray:
-        """J, V at p, and the right-hand side for the pressures of the moment [kg m], (n, 3) (eq. 12.2)."""
+        """Updates J and V at p; returns the right-hand side with the current pressures [kg m], (n, 3) (eq. 12.2)."""
         out = np.empty_like(self.p)
         imbalance_into(self.model, self.nodes, self.rows, self.p, self.boundary, out)
         return out
@@ -189,7 +191,7 @@ class Step:
     def answers_of_all(self) -> np.ndarray:
         """dt² A⁻¹ J_rᵀ [m/Pa] before contact, a back-solve each, (m, n, 3).
 
-        Once a step, with J where the passes start: what Jᵀ turns by after that, the next pass makes up for.
+        Computed once per step with J at the start of the passes; the next pass corrects for the change of Jᵀ.
         """
         units = np.eye(len(self.rows.lam))
         return self.boundary.dt**2 * np.stack([self.factor.respond(self.pushed(unit)) for unit in units])
@@ -217,7 +219,7 @@ class Step:
         return pressure, answer
 
     def book(self, active: ActiveSet, impulses: np.ndarray) -> None:
-        """Impulses of obstacles and attachments [N s] (eq. 3.6)."""
+        """Adds the impulses of obstacles and attachments [N s] (eq. 3.6)."""
         nodes, net, dt = self.nodes, self.model, self.boundary.dt
         self.contact.book(active, impulses, self.diagnostics.contact_impulse)
         spring_forces_into(self.p, net.ends, net.rest_length, net.stiffness, nodes.force)

@@ -1,5 +1,5 @@
-"""Other ways of the literature to deform an organ, which leave forces, masses or large turns out.
+"""Other approaches from the literature, which omit the volume constraint, forces, masses or large rotations.
 
-They run through the same scenes, records and metrics as METHODS, but do not promise what those do: no momentum in free
-flight, no order of a trajectory. What they promise stands in their files and is tested there.
+They run through the same scenes, records and metrics as METHODS, but do not claim what those do, such as momentum in
+free flight or the order of a trajectory. Their files state their claims, which are tested separately.
 """

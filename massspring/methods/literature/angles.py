@@ -9,7 +9,7 @@ from massspring.kernels.jit.by_address import by_address
 from massspring.kernels.jit.decorators import njit_lean
 
 STRAIGHT = 1e-12
-"""Sine of an angle that is 0 or π but for round-off: the direction in which it opens is not known."""
+"""Sine below which an angle counts as 0 or π: its gradient then has no direction."""
 
 
 @by_address
@@ -26,8 +26,8 @@ class Angles(NamedTuple):
 
 @njit_lean
 def opening(x, i, apex, j):
-    """(θ, sin θ, cos θ) of the angle between the edges from `apex` to i and j, and their lengths [m]; NaN without a
-    length."""
+    """(θ, sin θ, cos θ) of the angle between the edges from `apex` to i and j, and their lengths [m]; NaN if an edge
+    has no length."""
     a0, a1, a2 = x[i, 0] - x[apex, 0], x[i, 1] - x[apex, 1], x[i, 2] - x[apex, 2]
     b0, b1, b2 = x[j, 0] - x[apex, 0], x[j, 1] - x[apex, 1], x[j, 2] - x[apex, 2]
     c0, c1, c2 = a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0
@@ -50,7 +50,7 @@ def angle_energy(x, angles):
 def angle_forces_into(x, angles, force):
     """f = −κ (θ − θ0) ∂θ/∂x [N], (n, 3), ∂θ/∂x_i = (cos θ â − b̂)/(|a| sin θ) (eq. 14.6).
 
-    A straight angle that wants to bend does not know whereto and gives none. Internal: no force and no moment in sum.
+    An angle of 0 or π has no direction to bend in and gives no force. Internal: forces and moments sum to zero.
     """
     force[:] = 0.0
     for k in range(angles.rest.shape[0]):

@@ -1,13 +1,13 @@
-"""Angular springs: what bends the surface is resisted at its nodes, in place of a volume constraint.
+"""Angular springs: they resist bending of the surface at its nodes, in place of a volume constraint.
 
-Nedel, Thalmann, Real time muscle deformations using mass-spring systems, Computer Graphics International 1998: beside
-the linear springs, "angular springs" keep the angle between opposite edges at each node of the surface, meant to keep
-the shape and so the volume. Their energy is ½ κ (θ − θ0)² (docs/theory.md, eq. 14.5); their constants are left to the
-user. Here κ = `ratio` k̄ |a| |b|, k̄ the mean stiffness of the linear springs, so that bending an edge by its length
-takes `ratio` times the force of a linear spring.
+Nedel, Thalmann, Real time muscle deformations using mass-spring systems, Computer Graphics International 1998: in
+addition to the linear springs, "angular springs" keep the angle between opposite edges at each node of the surface.
+They are meant to keep the shape and so the volume. Their energy is ½ κ (θ − θ0)² (docs/theory.md, eq. 14.5); the
+authors leave their constants to the user. Here κ = `ratio` k̄ |a| |b|, k̄ the mean stiffness of the linear springs, so
+that bending an edge by its length takes `ratio` times the force of a linear spring.
 
 Limits: an angle below π is the same in a bulge and in a dent of equal depth; and a volume can shrink without any angle
-changing (all lengths by one factor). The volume is kept by nothing but stiffness, which also adds to the force.
+changing (all lengths by one factor). Only stiffness resists a change of volume, and it also adds to the force.
 """
 
 from dataclasses import dataclass
@@ -33,7 +33,7 @@ from massspring.world.obstacles import Attachment
 from massspring.world.surroundings import Surroundings
 
 TIE = 1e-9
-"""Cosines nearer to each other are equal but for round-off; the node that comes first is taken."""
+"""Difference below which two cosines count as equal; the first node is then chosen."""
 
 
 @njit_lean
@@ -54,7 +54,7 @@ class AngularSprings(Method):
     """Springs that keep the angles between opposite surface edges (Nedel, Thalmann 1998); no volume kept."""
 
     ratio: float = 1.0
-    """Force of an angular spring over that of a linear one [1]."""
+    """Stiffness of an angular spring over that of a linear one, as defined above [1]."""
 
     name: ClassVar[str] = "angular_springs"
     order: ClassVar[int] = 1
@@ -75,7 +75,7 @@ class AngularSprings(Method):
         return "it keeps no volume that could be filled" if surroundings.targets else None
 
     def added_stiffness(self, body: Body) -> csr_array:
-        """√κ ∂θ/∂x of every angle at rest, (3n, a)."""
+        """B [√(N/m)], (3n, a): √κ ∂θ/∂x of every angle at rest."""
         angles = angles_of(body, self.ratio)
         slope = angle_slopes(body.rest, angles) * np.sqrt(angles.stiffness)[:, None, None]
         rows = 3 * angles.corner[:, :, None] + np.arange(3)
@@ -95,7 +95,7 @@ class AngularSprings(Method):
 
 
 def angles_of(body: Body, ratio: float) -> Angles:
-    """The angles at surface nodes between each edge and that which is most nearly opposite to it."""
+    """The angles at surface nodes between each edge and the edge most nearly opposite to it."""
     ends = unique_edges(body.triangles, EDGES_OF_TRIANGLE).astype(np.int64)
     both = np.concatenate([ends, ends[:, ::-1]])
     both = both[np.argsort(both[:, 0], kind="stable")]
@@ -114,7 +114,7 @@ def angles_of(body: Body, ratio: float) -> Angles:
 
 
 def angle_slopes(x: np.ndarray, angles: Angles) -> np.ndarray:
-    """∂θ/∂x of the first end, the apex and the second end [1/m] at `x` (n, 3), (a, 3, 3); 0 of a straight angle."""
+    """∂θ/∂x of the first end, the apex and the second end [1/m] at `x` (n, 3), (a, 3, 3); 0 for an angle of 0 or π."""
     edge = x[angles.corner[:, [0, 2]]] - x[angles.corner[:, 1]][:, None]
     length = np.linalg.norm(edge, axis=2, keepdims=True)
     unit = edge / length

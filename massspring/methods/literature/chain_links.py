@@ -1,8 +1,8 @@
-"""Links of a chain mail: how far nodes may be apart along each axis, and what a moved node does to the others.
+"""Links of ChainMail: bounds on the distance of nodes along each axis, and how moved nodes displace the others.
 
-A link asks low ≤ x_j − x_i ≤ high along each axis. Such bounds are closed under minima and maxima, so that fixed nodes
-lower the others in one pass and raise them in another, each node as little as it must; what comes out depends on no
-order (docs/theory.md, eq. 14.8).
+A link asks low ≤ x_j − x_i ≤ high along each axis. Solutions of such bounds are closed under minima and maxima. So one
+pass lowers and another raises the nodes, each by as little as the fixed nodes require, and the result does not depend
+on the order (docs/theory.md, eq. 14.8).
 """
 
 from typing import NamedTuple
@@ -14,7 +14,7 @@ from massspring.kernels.jit.by_address import by_address
 from massspring.kernels.jit.decorators import njit_inlined, njit_lean
 
 TOUCHING = 1e-12
-"""A node this little inside an obstacle [m] lies on it."""
+"""Depth inside an obstacle up to which a node lies on it [m]."""
 
 
 @by_address
@@ -22,7 +22,7 @@ class Links(NamedTuple):
     """2 s links, from both ends of each of s springs; n nodes."""
 
     start: np.ndarray
-    """Where the links of each node begin, (n + 1,) int64."""
+    """First link of each node, (n + 1,) int64."""
     other: np.ndarray
     """The node at the other end, (2s,) int64."""
     rest: np.ndarray
@@ -48,7 +48,7 @@ class Mail(NamedTuple):
 
 @njit_inlined
 def spread(x, mail, axis, raising):
-    """Moves nodes along `axis` as little as links to fixed nodes, and to nodes so moved, ask, down or up."""
+    """Moves nodes up (`raising`) or down along `axis`, by as little as their links to fixed and moved nodes require."""
     links, fixed, queue, queued = mail.links, mail.fixed, mail.queue, mail.queued
     size, head, count = queue.shape[0], 0, 0
     for i in range(size):
@@ -76,7 +76,8 @@ def spread(x, mail, axis, raising):
 
 @njit_lean
 def propagate(x, mail):
-    """All axes down, then up (eq. 14.8); whether a link is left beyond its limits: fixed nodes are too far apart."""
+    """`spread` along all axes, down, then up (eq. 14.8). Returns whether a link still exceeds its bounds because fixed
+    nodes are too far apart."""
     for axis in range(3):
         spread(x, mail, axis, False)
         spread(x, mail, axis, True)
@@ -92,7 +93,7 @@ def propagate(x, mail):
 
 @njit_lean
 def push_out(x, model, mail, boundary, step):
-    """Puts surface nodes that are inside an obstacle onto it, and fixes them; how many."""
+    """Moves surface nodes that are inside an obstacle onto it, and fixes them; returns how many."""
     count = 0
     for c in range(model.surface_nodes.shape[0]):
         i = model.surface_nodes[c]
@@ -106,7 +107,7 @@ def push_out(x, model, mail, boundary, step):
 
 @njit_inlined
 def lifted(x, boundary, step, i):
-    """Moves node i out of the obstacles that it is inside of, one after the other; whether it was in one."""
+    """Moves node i out of all obstacles that contain it, one after the other. Returns whether there was one."""
     inside = False
     for o in range(boundary.radius.shape[0]):
         place = boundary.position[step, o]
@@ -131,10 +132,10 @@ def bounded(x, links, i, axis, place):
 
 @njit_lean
 def relax(x, model, mail, boundary, when):
-    """Moves each node that is not held to the mean of where its links would have it, within all its links and outside
-    of obstacles, one after the other (eq. 14.9); a node that cannot stays.
+    """Moves each free node in turn to the mean of the positions at which its links are at rest, within the bounds of
+    all its links and outside obstacles (eq. 14.9). A node for which that is impossible does not move.
 
-    `when`: the step, and whether the last node comes first.
+    `when`: (step, whether to start with the last node).
     """
     links, (step, backwards) = mail.links, when
     for k in range(x.shape[0]):
@@ -158,7 +159,7 @@ def relax(x, model, mail, boundary, when):
 
 @njit_inlined
 def is_inside(x, boundary, step, i):
-    """Whether node i is inside an obstacle, round-off of one that lies on it aside."""
+    """Whether node i is inside an obstacle by more than TOUCHING."""
     for o in range(boundary.radius.shape[0]):
         place = boundary.position[step, o]
         gap, _, _, _ = gap_and_normal(boundary, o, x[i, 0] - place[0], x[i, 1] - place[1], x[i, 2] - place[2])

@@ -1,15 +1,15 @@
-"""3-D ChainMail: shape passed on from node to node by limits of the links between them, without forces or masses.
+"""3-D ChainMail: displacements propagate from node to node through limits on their links, without forces or masses.
 
 Gibson, 3D ChainMail: a fast algorithm for deforming volumetric objects, Symposium on Interactive 3D Graphics 1997, on
 grids; Li, Brodlie, Soft object modelling with generalised ChainMail, Computer Graphics Forum 22(4), 2003, on any mesh.
-A link may be shorter along each axis by `compression` of what it is at rest, longer by `stretch`, and aside by `shear`
-of its other components. In each step held nodes and those that an obstacle meets are placed, the others follow as
-little as their links ask (docs/theory.md, eq. 14.8), and `sweeps` of elastic relaxation move every node towards the
-mean of where its neighbours would have it (14.9), within the links.
+Along each axis a link may be shorter than at rest by `compression`, longer by `stretch`, and displaced by `shear` of
+its other components. In each step held nodes and those inside obstacles are placed, and the others move by as little as
+their links require (docs/theory.md, eq. 14.8), and `sweeps` of elastic relaxation move every node towards the mean of
+the positions at which its links are at rest (14.9), within the limits.
 
-Limits: geometry alone. There is no force to feel, no weight, no swing, and no volume; limits and relaxation follow the
-axes, so that a body that turns is bent back. What is pressed beyond the limits of the links between two fixed nodes is
-counted with the limited corrections.
+Limits: the method is purely geometric. There is no contact force, no gravity, no inertia, and no volume; limits and
+relaxation refer to fixed axes, so a rotated body is bent back. Steps in which the links between fixed nodes exceed
+their limits count as limited corrections.
 """
 
 from dataclasses import dataclass
@@ -30,12 +30,12 @@ from massspring.world.obstacles import Attachment
 from massspring.world.surroundings import Surroundings
 
 ROUNDS = 20
-"""Of obstacles and links in a step; nodes that still enter are found in the next."""
+"""Most rounds of obstacles and links in a step; the next step finds nodes that are still inside."""
 
 
 @njit_lean
 def chain_mail_frame(model, nodes, boundary, diagnostics, mail, sweeps):
-    """One frame: place, pass on, relax (eq. 14.8, 14.9)."""
+    """One frame: place, propagate, relax (eq. 14.8, 14.9)."""
     x, before = nodes.x, nodes.v_star
     for step in range(boundary.position.shape[0]):
         mail.fixed[:] = 0
@@ -66,13 +66,13 @@ class ChainMail(Method):
     """3-D ChainMail (Gibson 1997): links of limited stretch and shear pass motion on, then relax; no forces."""
 
     compression: float = 0.3
-    """What a link may be shorter along an axis, over its length there [1]."""
+    """Largest shortening of a link along an axis, over its extent along that axis [1]."""
     stretch: float = 0.3
-    """What it may be longer."""
+    """Largest lengthening of a link along an axis, over its extent along that axis [1]."""
     shear: float = 0.3
-    """What it may be aside, over its length across the axis."""
+    """Largest displacement of a link along an axis by shear, over the sum of its extents along the other axes [1]."""
     sweeps: int = 5
-    """Of relaxation, in each step."""
+    """Sweeps of relaxation in each step."""
 
     name: ClassVar[str] = "chain_mail"
     order: ClassVar[int] = 0
@@ -112,7 +112,7 @@ class ChainMail(Method):
         return start(body, attachments, v, memory=Mail(self.links_of(body), *scratch))
 
     def links_of(self, body: Body) -> Links:
-        """A link from either end of every spring."""
+        """Two links for every spring, one from either end."""
         first, second = body.springs.ends.astype(np.int64).T
         begin, end = np.concatenate([first, second]), np.concatenate([second, first])
         order = np.lexsort((end, begin))
@@ -126,7 +126,7 @@ class ChainMail(Method):
         return Links(first_link, end, rest, low, high)
 
     def advance(self, state: State, boundary: BoundaryConditions) -> State:
-        """One frame; what obstacles and attachments give is not a number."""
+        """One frame; the impulses of obstacles and attachments are NaN."""
         after = begin_frame(state, boundary)
         chain_mail_frame(after.model, after.nodes, boundary, after.diagnostics, after.memory, self.sweeps)
         for impulse in (after.diagnostics.contact_impulse, after.diagnostics.held_impulse):

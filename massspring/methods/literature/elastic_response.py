@@ -1,14 +1,15 @@
-"""The elastic response of the held organ, precomputed: each step ends at rest, displacements are linear in the forces.
+"""The precomputed elastic response of the held organ: each step ends in equilibrium, displacements are linear in the
+forces.
 
 Bro-Nielsen, Cotin (1996) and Cotin, Delingette, Ayache (1999, 2000): u = K⁻¹ f is solved for unit forces at every
-surface node before the run; then what obstacles ask of touched nodes is a small dense system for their forces, and the
-shape a sum of columns. James, Pai (1999, ArtDefo) solve the same by updates of a boundary-element inverse. Here K is of
-the elements of docs/theory.md (13.1) at rest, volumes at every point; obstacles are met as in (14.3), held nodes carry
-the shapes Ψ of their attachments (14.2).
+surface node before the run. In the run a small dense system gives the contact forces at touched nodes, and the shape is
+a sum of columns. James, Pai (1999, ArtDefo) solve the same by updates of a boundary-element inverse. Here K is that of
+the elements of docs/theory.md (13.1) at rest, with a volume term at every point. Contact follows (14.3), and
+attachments displace the body by their shapes Ψ (14.2).
 
-Limits: displacements are linear: what turns, swells (1/cos of the angle), and a press of a fifth of an organ changes
-its volume by per cents. No inertia, no damping: a step ends where a slow press would. The columns fill 72 bytes times
-surface nodes times nodes.
+Limits: displacements are linear: a rotated part swells (by 1/cos of the angle), and pressing an organ by a fifth
+changes its volume by several per cent. No inertia, no damping: every step ends in equilibrium. The columns take 72
+bytes × surface nodes × nodes.
 """
 
 from dataclasses import dataclass, replace
@@ -36,9 +37,9 @@ from massspring.world.obstacles import Attachment
 from massspring.world.surroundings import Surroundings
 
 MOST_BYTES = 2e9
-"""Of the columns."""
+"""Largest size of the columns [bytes]."""
 TOGETHER = 256
-"""Columns that are solved for at once."""
+"""Number of columns solved for at once."""
 
 
 @dataclass(frozen=True)
@@ -75,7 +76,7 @@ class ElasticResponse(Method):
         return why_not_among(surroundings)
 
     def start(self, body: Body, attachments: tuple[Attachment, ...] = (), v: np.ndarray | None = None) -> State:
-        """The body at rest with all its columns. Raises MassSpringError where they are too many."""
+        """The body at rest with all its columns. Raises MassSpringError if they exceed MOST_BYTES."""
         columns = 3 * len(body.surface_nodes)
         size = 8.0 * columns * 3 * body.node_count
         if size > MOST_BYTES:
@@ -105,15 +106,15 @@ class ElasticResponse(Method):
 
 @dataclass(frozen=True, eq=False)
 class Precomputed:
-    """What is solved for before the run."""
+    """Solutions computed before the run."""
 
     held: LinearBody
     sag: np.ndarray
-    """Displacement by a gravity of 1 along each axis [s²], (3n, 3)."""
+    """Displacement by a gravity of 1 m/s² along each axis [s²], (3n, 3)."""
     columns: np.ndarray
     """K⁻¹ of unit forces at the free surface nodes [m/N], (s, 3, 3n)."""
     place: np.ndarray
-    """Number of a node among those, (n,); −1 where there is none."""
+    """Index of each node in `columns`, (n,); −1 if it has none."""
 
 
 def precomputed(held: LinearBody, model: Model) -> Precomputed:
@@ -134,7 +135,7 @@ def precomputed(held: LinearBody, model: Model) -> Precomputed:
 
 
 class Columns:
-    """The response along rows from the columns of their nodes."""
+    """The response along contact rows from the columns of their nodes."""
 
     def __init__(self, memory: Precomputed) -> None:
         self._memory = memory

@@ -16,7 +16,8 @@ from massspring.methods.elements.tangent import elements_of
 from massspring.world.surroundings import Surroundings
 
 STRAIGHT = 1e-6
-"""Of the extent of the held nodes: nodes nearer to one line leave the body a turn about it."""
+"""Distance from a straight line, over the extent of the held nodes, within which held nodes leave the body free to
+rotate about the line."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,19 +29,19 @@ class LinearBody:
     free: np.ndarray
     """Numbers of the coordinates that are not held, (f,)."""
     inner: csr_array
-    """K of those [N/m], (f, f)."""
+    """K of the free coordinates [N/m], (f, f)."""
     factor: Any
     """Its LU factors."""
     follow: np.ndarray
     """Ψ: displacements at rest when one attachment moves by 1 along an axis [1], (3n, 3g)."""
     pull: csr_array
-    """What attachments give per displacement, K summed over their nodes [N/m], (3g, 3n)."""
+    """Force of attachments per displacement, K summed over their nodes [N/m], (3g, 3n)."""
     mass: np.ndarray
-    """[kg], (n,); weight is that of the mass, inertia that of `inertia`."""
+    """Gravitational mass of each node [kg], (n,)."""
     inertia: np.ndarray
-    """[kg], (n,)."""
+    """Inertial mass of each node [kg], (n,)."""
     held_mass: np.ndarray
-    """[kg], (g,)."""
+    """Gravitational mass of the nodes of each attachment [kg], (g,)."""
 
     def solve(self, forces: np.ndarray) -> np.ndarray:
         """K⁻¹ `forces` (3n, …) [N] with held nodes at rest [m]."""
@@ -49,7 +50,7 @@ class LinearBody:
         return moved
 
     def held_impulse(self, u: np.ndarray, boundary: BoundaryConditions) -> np.ndarray:
-        """What each attachment gives in a step that ends at displacements `u` (3n,) [N s], (g, 3) (eq. 3.6)."""
+        """Impulse of each attachment in a step that ends at displacements `u` (3n,) [m]: (g, 3) [N s] (eq. 3.6)."""
         force = (self.pull @ u).reshape(-1, 3)
         return boundary.dt * (force - self.held_mass[:, None] * boundary.gravity)
 
@@ -66,7 +67,7 @@ def linear_stiffness(body: Body, bulk_modulus: float) -> csr_array:
 
 
 def linear_body(body: Body, model: Model, bulk_modulus: float) -> LinearBody:
-    """The body at rest with what `model` holds. Raises MassSpringError where that leaves it a rigid motion."""
+    """The body at rest with the held nodes of `model`. Raises MassSpringError if these allow a rigid motion."""
     check_held(model)
     stiffness = linear_stiffness(body, bulk_modulus)
     n, groups = body.node_count, int(model.held_group.max()) + 1
@@ -94,7 +95,7 @@ def linear_body(body: Body, model: Model, bulk_modulus: float) -> LinearBody:
 
 
 def check_held(model: Model) -> None:
-    """Raises MassSpringError where the held nodes are none, or lie on one line."""
+    """Raises MassSpringError if no nodes are held, or all held nodes lie on one line."""
     place = model.held_rest
     extent = np.linalg.svd(place - place.mean(axis=0), compute_uv=False) if len(place) > 2 else np.zeros(3)
     if not extent[1] > STRAIGHT * extent[0]:
@@ -104,12 +105,12 @@ def check_held(model: Model) -> None:
 
 
 def why_not_linear(body: Body) -> str | None:
-    """Why a body cannot be taken as linear elements; None when it can."""
+    """Why a body cannot be treated as linear elastic elements; None if it can."""
     return ImplicitElements().why_not(body)
 
 
 def why_not_among(surroundings: Surroundings) -> str | None:
-    """Why a linear body cannot be in such surroundings; None when it can."""
+    """Why a linear body does not support such surroundings; None if it does."""
     if not surroundings.attachments:
         return "no nodes are clamped, and a linear body swells when it rotates; clamp part of it"
     if surroundings.rough:
@@ -120,6 +121,6 @@ def why_not_among(surroundings: Surroundings) -> str | None:
 
 
 def check_ratio(method: str, name: str, value: float) -> None:
-    """Raises MassSpringError for a bulk modulus over mu that leaves a body no stiffness in some direction."""
+    """Raises MassSpringError for a bulk modulus over mu with which a body has no stiffness in some direction."""
     if not 1.0 < value < float("inf"):
         raise MassSpringError(f"{method}'s {name} is {value} mu; it must be above 1 and finite")

@@ -1,16 +1,18 @@
 """Vibration modes of the held organ: a few decoupled oscillators in place of all nodes.
 
-Pentland, Williams (1989): the modes of M ü + c M u̇ + K u = f are kept up to a number, each an equation of its own;
-James, Pai (2002, DyRT) integrate each exactly; Hauser, Shen, O'Brien (2003) add what is held and obstacles, whose
-pushes are solved for through the modes (docs/theory.md, section 14). With u = Ψ d + Φ q, Φᵀ M Φ = 1, K Φ = M Φ ω²,
+Pentland, Williams (1989): the modes of M ü + c M u̇ + K u = f are kept up to a number, each with a separate equation;
+James, Pai (2002, DyRT) integrate each exactly; Hauser, Shen, O'Brien (2003) add attachments and obstacles, whose
+contact forces are solved for in terms of the modes (docs/theory.md, section 14). With u = Ψ d + Φ q, Φᵀ M Φ = 1, K Φ =
+M Φ ω²,
 
     q̈ + c q̇ + ω² q = Φᵀ (f + m g) − Φᵀ M Ψ (d̈ + c ḋ)
 
-K is that of linear elements (14.1), Ψ the static shapes of moved attachments (14.2), as Craig and Bampton (1968) have
-them. Without obstacles each oscillator is advanced exactly; beside them by backward Euler, which presses steadily.
+K is that of linear elements (14.1), Ψ the static shapes of moved attachments (14.2), as in Craig and Bampton (1968).
+Without obstacles each oscillator is advanced exactly; with obstacles by backward Euler, which gives a steady contact
+force.
 
-Limits: displacements are linear: what turns, swells. Modes that are left out do not give way: a narrow contact is too
-stiff until there are as many modes as its shape needs.
+Limits: displacements are linear, so a rotated part swells. Omitted modes do not deform: a narrow contact is too stiff
+unless there are as many modes as its shape needs.
 """
 
 from dataclasses import dataclass, replace
@@ -46,7 +48,7 @@ class LinearModes(Method):
     """Linear vibration modes of the held organ (Pentland, Williams 1989): decoupled oscillators, contact solved for."""
 
     modes: int = 300
-    """How many of the lowest are kept; all of a body that has fewer."""
+    """Number of the lowest modes that are kept; all if a body has fewer."""
     bulk_ratio: float = 50.0
     """K over the shear modulus [1]; 50 is a Poisson ratio of 0.49."""
 
@@ -105,10 +107,11 @@ class Modes:
     carried: np.ndarray
     """Φᵀ M Ψ [√kg], (k, 3g)."""
     exact: dict[tuple[float, float], np.ndarray]
-    """Step and damping -> what takes (q, q̇, load) of each mode through a step, (k, 2, 3)."""
+    """(step, damping) -> propagator of (q, q̇, load) of each mode over a step, (k, 2, 3)."""
 
     def propagator(self, dt: float, damping: float) -> np.ndarray:
-        """Of each oscillator under a constant load for `dt` [s] with `damping` [1/s], (k, 2, 3)."""
+        """The exact propagator of each oscillator under a constant load over `dt` [s] with `damping` [1/s], (k, 2,
+        3)."""
         if (dt, damping) not in self.exact:
             omega = np.sqrt(self.square)
             rate = np.zeros((len(omega), 3, 3))  # of (ω q, q̇, load)
@@ -139,7 +142,7 @@ def modes_of(held: LinearBody, count: int) -> Modes:
 
 
 class Motion:
-    """One frame; the oscillators are read off the nodes at its start."""
+    """One frame; the modal coordinates are computed from the nodes at its start."""
 
     def __init__(self, state: State, boundary: BoundaryConditions) -> None:
         self.state, self.boundary = state, boundary
@@ -149,19 +152,19 @@ class Motion:
         first = np.unique(model.held_group, return_index=True)[1]
         held = model.held_nodes[first]
         self.place = (nodes.x[held] - model.held_rest[first]).ravel()
-        """Of the attachments [m], (3g,)."""
+        """Displacements of the attachments [m], (3g,)."""
         self.speed = nodes.v[held].ravel()
-        """[m/s], (3g,)."""
+        """Velocities of the attachments [m/s], (3g,)."""
         u = (nodes.x - self.modes.held.rest).ravel()
         self.q = self.modes.seen @ u - self.modes.carried @ self.place
-        """[m √kg], (k,)."""
+        """Modal coordinates q [m √kg], (k,)."""
         self.p = self.modes.seen @ nodes.v.ravel() - self.modes.carried @ self.speed
-        """dq/dt, (k,)."""
+        """dq/dt [m √kg/s], (k,)."""
         weight = (self.modes.held.mass[:, None] * boundary.gravity).ravel()
         self.weight = self.modes.shape.T @ weight
 
     def take(self, step: int) -> None:
-        """One step, and what it takes from obstacles and attachments."""
+        """Makes one step and adds the impulses of obstacles and attachments."""
         boundary, modes, state = self.boundary, self.modes, self.state
         place = boundary.held_displacement[step].ravel()
         speed = (place - self.place) / boundary.dt
@@ -201,10 +204,10 @@ class Motion:
 
 
 class ModalResponse:
-    """What rows do to the modes of a step."""
+    """Response of the modes to contact forces along rows in a step."""
 
     def __init__(self, modes: Modes, speeds: np.ndarray, dt: float) -> None:
-        """`speeds`: of each mode at the end of the step by a unit of load, (k,)."""
+        """`speeds`: velocity of each mode at the end of the step per unit of load, (k,)."""
         self._modes, self._speeds, self._dt = modes, speeds, dt
         self._loads = np.zeros((0, len(speeds)))
 
@@ -219,5 +222,5 @@ class ModalResponse:
         return (self._modes.shape @ (self._dt * self.speed(pushes))).reshape(-1, 3)
 
     def speed(self, pushes: np.ndarray) -> np.ndarray:
-        """Change of the speeds of the modes by `pushes` (c,) [N], (k,)."""
+        """Change of the modal velocities by `pushes` (c,) [N], (k,)."""
         return self._speeds * (pushes @ self._loads)

@@ -1,7 +1,8 @@
-"""Obstacles against a body that answers forces linearly: pushes and gaps, of which one is zero at every row (eq. 14.3).
+"""Contact of obstacles with a body that responds linearly to forces: at every row the contact force or the gap is zero
+(eq. 14.3).
 
-The rows are the normals at touched nodes; the pushes solve a linear complementarity problem, as in Hauser, Shen,
-O'Brien (2003) and in Pauly, Pai, Guibas (2004).
+The rows are the normals at touched nodes; the contact forces (`pushes`) solve a linear complementarity problem, as in
+Hauser, Shen, O'Brien (2003) and in Pauly, Pai, Guibas (2004).
 """
 
 from typing import NamedTuple, Protocol
@@ -14,22 +15,22 @@ from massspring.layout.state import State
 from massspring.methods.implicit.contact import Contact, TouchedRows
 
 REVISIONS = 12
-"""Of the touched set in one step; a node that would still enter is found in the next."""
+"""Most revisions of the touched set in one step; the next step finds nodes that would still enter."""
 PASSES, SETTLED = 6, 1e-6
-"""Along round obstacles, whose rows lie where the last pass ended: at most, and motion over the longest correction, 0.3
-of an edge, after which none is made."""
+"""Passes over spheres and capsules, whose rows depend on where the last pass ended: the most passes, and the motion,
+over the correction limit of 0.3 of an edge, at which they end."""
 PIVOTS = 20
-"""Exchanges of whole blocks; where they go round in circles, one row after the other."""
+"""Most exchanges of all wrong rows at once."""
 SOFTNESS = 1e-11
-"""Relative compliance of a row where fewer modes than rows leave a matrix without inverse."""
+"""Relative compliance added to a row if the matrix is singular, since there are fewer modes than rows."""
 RESOLVED = 1e-10
-"""Of the largest gap: what a solve of rows that do not depend on each other leaves at most."""
+"""Residual, over the largest gap, up to which a solve with independent rows counts as accurate."""
 ROUND_OFF = 1e-12
-"""Of the largest gap."""
+"""Round-off of a gap, over the largest gap."""
 
 
 class Response(Protocol):
-    """How the body answers unit forces along rows in a step."""
+    """Protocol for the response of a body to unit forces along rows in a step."""
 
     def compliance(self, rows: TouchedRows) -> np.ndarray:
         """How far row b moves along its direction by 1 N along row a [m/N], symmetric, (c, c)."""
@@ -41,24 +42,24 @@ class Response(Protocol):
 
 
 class Pressed(NamedTuple):
-    """How a step ends on the obstacles."""
+    """The end of a step with contact."""
 
     end: np.ndarray
-    """[m], (n, 3)."""
+    """Positions [m], (n, 3)."""
     rows: TouchedRows | None
     """None without obstacles."""
     pushes: np.ndarray
-    """[N], (c,), none negative."""
+    """Contact forces along the rows [N], (c,), none negative."""
 
     def book(self, boundary: BoundaryConditions, impulse: np.ndarray) -> None:
-        """Adds what obstacles give in the step to `impulse` (o, 3) [N s]."""
+        """Adds the impulses of obstacles in the step to `impulse` (o, 3) [N s]."""
         if self.rows is not None:
             given = boundary.dt * self.pushes[:, None] * self.rows.direction
             np.add.at(impulse, self.rows.obstacle, given)
 
 
 def press(state: State, boundary: BoundaryConditions, step: int, free: np.ndarray, response: Response) -> Pressed:
-    """From where the step would end without obstacles, `free` (n, 3) [m], to where it ends."""
+    """The end of the step with contact, from `free` (n, 3) [m], its end without obstacles."""
     if not len(boundary.radius):
         return Pressed(free, None, np.zeros(0))
     model, nodes, contacts = state.model, state.nodes, state.contacts
@@ -77,8 +78,8 @@ def press(state: State, boundary: BoundaryConditions, step: int, free: np.ndarra
 
 
 def turn_places(rows: TouchedRows, end: np.ndarray, boundary: BoundaryConditions, step: int) -> float:
-    """Puts the places of rows at round obstacles where nodes that end at `end` (n, 3) would leave them along their
-    directions (eq. 3.7); how far the farthest is moved [m]."""
+    """Updates the places of rows at spheres and capsules for nodes that end at `end` (n, 3) [m]: on the surface along
+    the direction of the row (eq. 3.7). Returns the largest change [m]."""
     obstacle, direction = rows.obstacle, rows.direction
     span, centre = boundary.span[obstacle], boundary.position[step, obstacle]
     square = np.einsum("ci,ci->c", span, span)
@@ -97,24 +98,24 @@ def turn_places(rows: TouchedRows, end: np.ndarray, boundary: BoundaryConditions
 def complementary(compliance: np.ndarray, missing: np.ndarray) -> np.ndarray:
     """f ≥ 0 with A f ≥ b and f·(A f − b) = 0, A = `compliance` (c, c), symmetric, b = `missing` (c,).
 
-    By exchanges of all wrong rows at once (Kostreva 1978). Where those do not end, or rows depend on each other, by
-    non-negative least squares with a little softness.
+    Solved by exchanges of all wrong rows at once (Kostreva 1978). If those do not end, or rows depend on each other, by
+    non-negative least squares with the compliance SOFTNESS.
     """
     if not len(missing):
         return missing
     if not (np.isfinite(compliance).all() and np.isfinite(missing).all()):
-        return np.full_like(missing, np.nan)  # numbers are lost: the run ends
+        return np.full_like(missing, np.nan)  # not finite: the run ends
     forces = exchanged(compliance, missing)
     if forces is not None:
         return forces
     root = cholesky(compliance + SOFTNESS * compliance.diagonal().max() * np.eye(len(missing)))
-    from scipy.optimize import nnls  # 0.15 s that every command would wait for
+    from scipy.optimize import nnls  # the import takes 0.15 s, for which every command would wait
 
     return nnls(root, solve_triangular(root, missing, trans=1))[0]
 
 
 def exchanged(compliance: np.ndarray, missing: np.ndarray) -> np.ndarray | None:
-    """The same by exchanges; None where they find nothing."""
+    """The same by exchanges only; None if they find no solution."""
     pressed, allowed = np.ones(len(missing), dtype=bool), ROUND_OFF * np.abs(missing).max()
     for _ in range(PIVOTS):
         force = np.zeros_like(missing)

@@ -1,6 +1,6 @@
-"""An entry by file: one JSON file that says what ran where and how, and the file of its result next to it.
+"""An entry by file: a JSON file that describes program, machine and settings, and a result file next to it.
 
-Metrics are computed by us; one that is handed in is refused.
+Metrics are computed here; submitted ones are refused.
 """
 
 import json
@@ -26,7 +26,7 @@ HANDED = {"metrics", "errors", *(metric.name for metric in METRICS)}
 
 
 class EntryFile(BaseModel):
-    """What an entry says of itself."""
+    """The description of an entry in its JSON file."""
 
     model_config = ConfigDict(extra="forbid", strict=True)
 
@@ -48,7 +48,7 @@ class EntryFile(BaseModel):
     """How often the forces of all elements were evaluated in the whole run."""
     settings: dict[str, Any] = {}
     environment: dict[str, Any]
-    """Python, machine, packages, or whatever the engine runs in."""
+    """Python, machine, packages, or another environment of the engine."""
     command: str
     """By which it was computed."""
     ours: bool = False
@@ -109,7 +109,8 @@ def check_mesh_here(entry: EntryFile, scene: Scene) -> None:
 
 
 def judged_file(scene: Scene, entry: EntryFile, folder: Path) -> Record:
-    """The record of an entry whose result lies in `folder`. Raises StudyError for whatever does not fit the scene."""
+    """The record of an entry whose result lies in `folder`. Raises StudyError for anything that does not fit the
+    scene."""
     if not entry.result or Path(entry.result).name != entry.result:
         raise StudyError(f"the result {entry.result!r} of the entry must lie next to its JSON file; give its file name")
     record = entry_record(scene, folder / entry.result, entry.engine, entry.nodes, seconds=entry.seconds)

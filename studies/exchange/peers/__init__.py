@@ -1,1 +1,1 @@
-"""Other programs as contestants, one adapter file each: they read an exported scene and hand results in."""
+"""Adapters for other programs, one file each: they read an exported scene and write results."""

@@ -1,8 +1,9 @@
 """Bullet (PyBullet): deformable bodies of linear tetrahedra, stable neo-Hookean, explicit in stiffness.
 
-Volume is kept by the second Lame constant; here 49 mu, for stiffer ones need shorter steps. Planes are boxes that are
-moved by hand. It reports no force between a shape and a deformable body: the force is read off what the
-elements push back there. Damping is its own, on rates of strain; masses are equal, for it takes one for the whole body.
+Volume is kept by the second Lame constant; here 49 mu, for stiffer ones need shorter steps. Planes are boxes whose
+positions are set in each step. Bullet reports no force between a shape and a deformable body, so the force is computed
+from the forces of the elements there. Damping is Bullet's, on rates of strain; all nodes have equal masses, since
+Bullet takes only the mass of the body.
 """
 
 # Checked alike where the package is not installed.
@@ -32,7 +33,7 @@ BOX = 0.5
 
 
 class Deformable:
-    """A scene in Bullet: the organ, its obstacles, and what its elements answer."""
+    """A scene in Bullet: the organ, its obstacles, and the forces of its elements."""
 
     def __init__(self, scene: SceneFolder, dt: float, lame: float, damping: float) -> None:
         """Raises CannotDo."""
@@ -48,7 +49,7 @@ class Deformable:
         self.law = StableNeoHookean(scene.points, scene.cells, scene.mu, lame * scene.mu)
         self.organ = self._organ()
         self.bodies = [self._shape(one) for one in self.obstacles]
-        awake = pybullet.ACTIVATION_STATE_DISABLE_SLEEPING  # the loads are slower than what it takes for rest
+        awake = pybullet.ACTIVATION_STATE_DISABLE_SLEEPING  # the loads are slower than Bullet's threshold for rest
         pybullet.changeDynamics(self.organ, -1, activationState=awake)
         self.holds = [self._hold(held) for held in scene.data["held"]]
 

@@ -1,8 +1,7 @@
-"""Runs other programs on exported scenes, each in a process and an environment of its own, and judges what they hand
-in.
+"""Runs other programs on exported scenes, each in a separate process and environment, and evaluates their results.
 
-Whatever happens is an entry: a program that cannot do a scene is skipped with its reason, one that crashes or hangs has
-a row that says so, and the rest goes on.
+Every attempt gives an entry: a program that cannot do a scene is skipped with its reason, and one that crashes or hangs
+has a row with that status; the others continue.
 """
 
 import json
@@ -105,7 +104,7 @@ class Attempt:
 
     @property
     def words(self) -> list[str]:
-        """After the module: what its adapter is called with, besides the folders."""
+        """Command-line arguments of its adapter after the module, besides the folders."""
         return [self.peer.mesh, json.dumps(dict(self.peer.settings))]
 
 
@@ -163,7 +162,7 @@ def current(path: Path, attempt: Attempt, digest: str) -> Record | None:
 
 
 def judged(attempt: Attempt, given: Path, limit: float, environments: Path) -> Record:
-    """What came of an attempt on an exported scene."""
+    """The record of an attempt on an exported scene."""
     out = given / f"{attempt.name}.npz"
     status, message = hand_over(attempt, given, out, limit, environments)
     mesh = given_mesh(attempt.scene, attempt.nodes, attempt.peer.mesh)
@@ -206,7 +205,8 @@ def entry_of(attempt: Attempt, out: Path, digest: str) -> EntryFile:
 def hand_over(
     attempt: Attempt, given: Path, out: Path, limit: float, environments: Path = Path("environments")
 ) -> tuple[Status, str]:
-    """Runs the adapter in a process of its own, in the folder, where programs leave their logs; how it ended."""
+    """Runs the adapter in a separate process, in the folder, in which programs write their logs. Returns how it
+    ended."""
     peer = attempt.peer
     if peer.absent:
         return Status.SKIPPED, f"{peer.name}: {peer.absent}"

@@ -1,7 +1,7 @@
 """FElupe: quadratic tetrahedra with one pressure each (mean dilatation), neo-Hookean, a path of equilibria by Newton.
 
-The volume is kept by the scene's own bulk modulus. Planes and spheres touch nodes by a penalty, scaled to the stiffness
-of the body; the sphere is that of FElupe's own example for ContactRigidBase. Load steps that fail are halved.
+The volume is kept by the bulk modulus of the scene. Planes and spheres touch nodes by a penalty, scaled to the
+stiffness of the body; the sphere is that of FElupe's example for ContactRigidBase. Load steps that fail are halved.
 Inertia and damping are left out, as the scene allows: the loads are slow. A body that nothing holds is held at three
 nodes so that it cannot turn or drift, which takes no force.
 """
@@ -32,7 +32,7 @@ def run(scene: SceneFolder, out: Path, *, increments: int = INCREMENTS, penalty:
     count, obstacles = len(scene.points), scene.obstacles("plane", "sphere")
     centres = [place(one, 0.0)[None] for one in obstacles]
     mesh = felupe.Mesh(np.vstack([scene.points, *centres]), scene.cells, "tetra10")
-    mesh.points_without_cells = np.empty(0, np.int64)  # the obstacles' own points are moved by hand
+    mesh.points_without_cells = np.empty(0, np.int64)  # the reference points of the obstacles are moved in each step
     displacement = felupe.Field(felupe.RegionQuadraticTetra(mesh), dim=3)
     field = felupe.FieldContainer([displacement])
     bulk = scene.data["material"]["bulk_modulus"]
@@ -79,7 +79,8 @@ def _contact(scene: SceneFolder, field: Any, body: Any, number: int, penalty: fl
 
 
 def _force(scene: SceneFolder, body: Any, contacts: list[Any], count: int) -> float:
-    """The probed force [N]: what the obstacle's own point feels, turned round, or what moves the held region."""
+    """The probed force [N]: minus the force on the reference point of the obstacle, or the force that moves the held
+    region."""
     probed = scene.probed_obstacle
     result = (body if probed is None else contacts[probed]).results.force
     of_points = np.asarray(result.todense()).ravel()[: 3 * (count + len(contacts))].reshape(-1, 3)
@@ -94,7 +95,7 @@ def _fixed(displacement: Any, nodes: Any, *axes: int) -> Any:
 
 
 def _tied(scene: SceneFolder, displacement: Any) -> dict[str, Any]:
-    """What does not move of a free body: a node, a direction from it, and a plane through both."""
+    """The constraints of a free body: a node, a direction from it, and a plane through both."""
     x = scene.points - scene.points.mean(axis=0)
     reach = np.abs(x).max()
     middle, one, other = (

@@ -1,9 +1,9 @@
-"""MuJoCo: flexible bodies ("flex") of linear tetrahedra, Saint Venant-Kirchhoff, with contact by its own solver.
+"""MuJoCo: flexible bodies ("flex") of linear tetrahedra, Saint Venant-Kirchhoff, with contact by MuJoCo's solver.
 
 Volume is kept as its documentation has it, by a Poisson ratio near ½; the shear modulus is that of the tissue. Damping
-is that of the scene, on every degree of freedom. Obstacles are bodies that are moved by hand ("mocap"). So are held
-nodes, made so heavy that nothing moves them in a step; the force of a held region is what the springs of MuJoCo's
-elements ("qfrc_spring") push there.
+is that of the scene, on every degree of freedom. The positions of obstacles ("mocap" bodies) are set in each step. So
+are those of held nodes, which are so heavy that forces do not move them in a step; the force of a held region is that
+of MuJoCo's elements ("qfrc_spring") there.
 """
 
 # Checked alike where the package is not installed.
@@ -22,7 +22,7 @@ POISSON = 0.49
 STEP = 2e-3
 """[s]; implicit in positions (integrator "discrete")."""
 HEAVY = 1e6
-"""Mass of a held node over its own."""
+"""Factor on the mass of a held node."""
 
 XML = """<mujoco>
 <option timestep="{dt}" gravity="{gravity}" integrator="discrete" cone="elliptic"/>

@@ -1,4 +1,4 @@
-"""Our own methods on the same exported meshes, handed in and judged as what other programs compute."""
+"""Adapter for our methods on the same exported meshes, with results evaluated as those of other programs."""
 
 import time
 from dataclasses import replace

@@ -1,7 +1,6 @@
 """`python -m studies.exchange.peers.run MODULE FOLDER OUT MESH SETTINGS`: one adapter on one exported scene.
 
-The interpreter is that of the program's own environment. What it handed in gets the versions of all that is installed
-there.
+It runs with the interpreter of the program's environment, and adds the versions of all packages there to the results.
 """
 
 import json
@@ -15,7 +14,7 @@ from studies.exchange.peers.scene_folder import CANNOT, MISSING, CannotDo, Scene
 
 
 def main(module: str, folder: str, out: str, mesh: str, settings: str) -> int:
-    """Exit code 0, CANNOT or MISSING with a sentence on standard error; anything else is the adapter's own error."""
+    """Exit code 0, CANNOT or MISSING with a sentence on standard error; any other code is an error of the adapter."""
     try:
         adapter = import_module(module)
     except ModuleNotFoundError as error:

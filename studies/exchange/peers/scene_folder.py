@@ -1,6 +1,6 @@
-"""What an adapter knows of a scene: the exported folder, and nothing else of this program.
+"""Access of an adapter to a scene: it uses only the exported folder, and no other code of this program.
 
-It runs where that program is installed, and there numpy and meshio are all that it may count on.
+It runs in the environment of the other program, in which only numpy and meshio are certain to be installed.
 """
 
 import json
@@ -24,7 +24,7 @@ CELLS = {"straight": "tetra", "curved": "tetra10"}
 
 
 class CannotDo(StudyError):
-    """A program has no means for something that the scene needs; the message says for what."""
+    """A program does not support something that the scene needs; the message names it."""
 
 
 @dataclass(frozen=True)
@@ -104,7 +104,7 @@ class SceneFolder:
 
     @property
     def hung(self) -> np.ndarray:
-        """What hangs at every node beside its share of the tissue [kg], (n,): of the silicone beam alone."""
+        """Additional point mass at every node [kg], (n,); only the silicone beam has any."""
         masses = np.zeros(len(self.points))
         for entry in self.data.get("masses", ()):
             masses[entry["node"]] += entry["mass"]
@@ -183,7 +183,7 @@ def march(
     """Steps a program through the scene and hands it in: step(t) advances it by `dt` to time t [s], force(t) is the
     probed force then [N], of which the mean of the last `averaged` steps before each checkpoint counts.
 
-    evaluations: of all elements' forces in a step, where that is known."""
+    evaluations: number of evaluations of all element forces in a step, if known."""
     snapshots, forces, spent, begin = [scene.points], [0.0], 0.0, 0
     steps = np.round(scene.times / dt).astype(int)
     for end in steps[1:]:

@@ -1,6 +1,6 @@
 """SfePy: quadratic displacements with linear pressures on straight tetrahedra, neo-Hookean, equilibria by Newton.
 
-The volume is kept by the scene's own bulk modulus. Obstacles push by a penalty, integrated over the facets, and the
+The volume is kept by the bulk modulus of the scene. Obstacles push by a penalty, integrated over the facets, and the
 force is that integral. Inertia and damping are left out, as the scene allows: the loads are slow. A body that nothing
 holds is held at three nodes so that it cannot turn or drift, which takes no force.
 """

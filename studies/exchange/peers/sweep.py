@@ -25,10 +25,10 @@ SWEPT, NODES = (LIVER_PRESS, BALL_SQUEEZE), 150
 """An organ that is held and bent, and a free ball that is flattened: with a Poisson ratio of 0.3 coarse tetrahedra lock
 less in the first and give way in the second. Every program knows their planes."""
 SHARE = "share of the target [1]"
-"""The largest of the errors of force, displacement and volume, over what is usually enough."""
+"""The largest of the errors of force, displacement and volume, over their default targets."""
 COST = "cost [s/s]"
 VOLUME, LOST = metric("volume_worst"), 1.0
-"""Error of the volume [%] that is usually enough."""
+"""Metric of the volume error, and its target [%]."""
 AS_GOOD, AS_CHEAP = 1.05, 1.25
 """Factors on the smallest error and on the cost within which two settings are alike; measured costs vary by as much."""
 DIALS: dict[str, dict[str, tuple[float, ...]]] = {
@@ -39,9 +39,9 @@ DIALS: dict[str, dict[str, tuple[float, ...]]] = {
     "drake": {"poisson": (0.45, 0.4, 0.3), "step": (5e-3,), "finest": (1e-3,)},
     "sfepy": {"increments": (4,), "penalty": (500.0, 8000.0)},
 }
-"""What is varied of each program, one keyword of its adapter after the other, each from the best of those before; the
-first row of a program has the settings with which its adapter is written. No fewer load steps are tried: on two scenes
-they cost less, and on a third one SfePy's Newton iterations fail with one."""
+"""Values that are tried for each program, one keyword of its adapter after the other, each starting from the best so
+far. The first row of a program has the defaults of its adapter. No fewer load steps are tried: on two scenes they cost
+less, and on a third one SfePy's Newton iterations fail with one."""
 
 
 def swept(peer: Peer, folder: Path, limit: float, environments: Path) -> Iterator[dict[str, Any]]:

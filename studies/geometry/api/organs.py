@@ -1,4 +1,4 @@
-"""The meshes of the project by name: what scenes ask for."""
+"""The meshes of the project by name, as scenes request them."""
 
 import warnings
 from collections.abc import Mapping, Sequence
@@ -26,7 +26,7 @@ class PlaneCut(Protocol):
 
     @property
     def name(self) -> str:
-        """What it is called."""
+        """Name of the cut."""
         ...
 
     @property
@@ -57,12 +57,13 @@ def organ(
 ) -> OrganMesh:
     """The organ `name` of SHAPES with `nodes` nodes on its outer surface (exactly or within 2 %).
 
-    Outlines of the regions (None: the organ's own) lie on edges. A hollow organ is filled between its surface and its
-    lumen, in `layers` of prisms (None: as many as make them as high as long); with fill=False only the outer surface
-    is made. exact: flat sides enclose exactly the organ's volume, so nodes are a little off its surface, outlines on
-    theirs; else the nodes are on it and the volume is 1 to 12 % too small. sides: "straight" or "curved", those that
-    are to follow the organ's shape, for which nodes go where it needs them; None: nodes are evenly spread. cuts: lie on
-    faces of the filled mesh, which stays whole; their sections do not meet. Raises StudyError when the mesher cannot.
+    Outlines of the regions (None: those of the organ) lie on edges. A hollow organ is filled between its surface and
+    its lumen, in `layers` of prisms (None: so many that prisms are as high as long); with fill=False only the outer
+    surface is made. exact: flat sides enclose exactly the organ's volume, with nodes slightly off its surface but
+    outlines on it; else the nodes are on the surface and the volume is 1 to 12 % too small. sides: the kind of sides
+    that are to follow the organ's shape, "straight" or "curved", with nodes placed for it; None: nodes are evenly
+    spread. cuts: they lie on faces of the filled mesh, which is not opened; their sections must not meet. Raises
+    StudyError when the mesher cannot.
     """
     if isinstance(nodes, bool) or not isinstance(nodes, int | np.integer):
         raise StudyError(f"{name}: {nodes!r} surface nodes asked for; give a whole number such as 550")
@@ -114,13 +115,13 @@ def organ_family(
 def curved(mesh: OrganMesh, may_fold: bool = False, shape: Shape | None = None) -> CurvedMesh:
     """The filled organ with second-order elements that follow its true shape, its lumen's too; cached.
 
-    The vertices are those of `mesh`, and no element is folded anywhere, unless it `may_fold`. shape: of a scan, whose
-    recipe does not tell it. Raises StudyError for a mesh that is not filled, whose true shape is not known, or that is
-    too coarse to be curved.
+    The vertices are those of `mesh`, and no element is folded anywhere, unless it `may_fold`. shape: the true shape of
+    a scan, which its recipe does not contain. Raises StudyError for a mesh that is not filled, whose true shape is
+    unknown, or that is too coarse to be curved.
     """
     arrays = {"points": mesh.points, "tetrahedra": mesh.tetrahedra}
     if shape is not None and mesh.recipe["kind"] == "scan":
-        # How far the straight sides are off it: what tells this shape from others.
+        # The deviation of the straight sides from the shape identifies the shape.
         arrays["depths"] = shape.level(mesh.points[unique_edges(mesh.triangles)].mean(axis=1))
     recipe = {"kind": "curved", "name": f"{mesh.name}-curved", "source": mesh.recipe}
     if may_fold:

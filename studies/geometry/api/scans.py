@@ -35,23 +35,23 @@ from studies.geometry.surface.painted import painted_region
 from studies.geometry.surface.repair import RepairedSurface, border, mend
 
 LEVEL_KEYS = ("name", "solid", "smooth")
-"""Of a recipe: what decides the true shape, besides the surface itself."""
+"""Keys of a recipe on which the true shape depends, besides the surface itself."""
 
 
 @dataclass(frozen=True)
 class Remeshing:
-    """What is done to the surface of a file on its way to a body; lengths in metres."""
+    """Operations on the surface of a file before meshing; lengths in metres."""
 
     smooth: float = 0.0
-    """Folds are closed and bumps levelled up to about this size, see scan_shape; needs a number of nodes."""
+    """Folds are closed and bumps are smoothed up to about this size, see scan_shape; needs a number of nodes."""
     holes: bool = False
     """Borders are closed with flat lids first."""
     solid: float | None = None
-    """What the surface encloses is filled, openings up to that width closed, for capsules and double walls."""
+    """The interior of the surface is filled, with openings up to this width closed; for capsules and double walls."""
     wall: float | None = None
     """Thickness of the wall of a hollow organ; needs a number of nodes."""
     layers: int | None = None
-    """Of elements in the wall."""
+    """Layers of elements in the wall."""
     on_shape: bool = False
     """Nodes lie on the true shape, for sides that are curved onto it (true_shape_of); else flat sides enclose the
     volume."""
@@ -97,11 +97,11 @@ def scan(
     """A body from the surface in a file: welded, its largest part kept, oriented, and remeshed to `nodes` nodes.
 
     path: a file, or a Source, which also has a scale or a part. nodes: None keeps the file's own triangles. unit: of
-    the file, one of UNITS; None: what the file says, or metres where only they make an organ of it. fill: with
+    the file, one of UNITS; None: that stated in the file, or metres if only these give the size of an organ. fill: with
     tetrahedra. regions: attachments; with `nodes` their outlines lie on edges; None: those painted in the file, its
     point data `patch_NAME`. how: the fields of Remeshing. With `nodes` the mesh has the volume of the surface, and
-    `losses` says how near it is to the file. Warns of every change to the surface. Raises StudyError for what cannot be
-    read, mended or meshed, TypeError for an unknown field.
+    `losses` states its deviation from the file. Warns of every change to the surface. Raises StudyError for a file that
+    cannot be read, repaired or meshed, TypeError for an unknown field.
     """
     source, remeshing = as_source(path, unit), Remeshing(**how)
     name, content = source.path.name, opened(source)
@@ -149,7 +149,7 @@ def true_shape_of(source: Source, **how: Any) -> Shape:
     surface. how: the fields of Remeshing. Raises StudyError for what cannot be read or repaired."""
     remeshing, name = Remeshing(**how), source.path.name
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # the meshes of the shape tell of every change
+        warnings.simplefilter("ignore")  # meshing the shape warns of every change
         surface, recipe = repaired_surface(source, opened(source), remeshing)
     if remeshing.solid is None:
         check_watertight(surface, name)

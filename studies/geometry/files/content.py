@@ -1,4 +1,4 @@
-"""What a file holds, whatever its format: points, triangles or tetrahedra, and the parts that the file tells apart."""
+"""The content of a file of any format: points, triangles or tetrahedra, and named parts."""
 
 from dataclasses import dataclass, field
 
@@ -11,7 +11,7 @@ NONE = np.empty(0, np.int64)
 
 @dataclass(frozen=True, eq=False)
 class Content:
-    """A file's mesh in the file's own unit.
+    """The mesh of a file in the unit of the file.
 
     points: shape (n, 3)
     triangles: shape (t, 3)
@@ -20,7 +20,7 @@ class Content:
     names: parts that the file names, in its order; empty where it names none
     part: of each triangle the index into `names`, shape (t,); empty where the file names none
     unit: what the file's format or its header says, or None
-    unit_by_custom: whether the header does not say it, and the format's usual one is taken
+    unit_by_custom: whether the header states no unit, so that the usual one of the format is assumed
     """
 
     points: np.ndarray

@@ -1,4 +1,4 @@
-"""How large a mesh file is, before anything is read of it."""
+"""The size of a mesh file, estimated before it is read."""
 
 import re
 from pathlib import Path
@@ -6,9 +6,9 @@ from pathlib import Path
 from studies.base.errors import StudyError
 
 LARGE = 2_000_000
-"""Triangles from which a person is asked first: minutes of work and gigabytes of memory."""
+"""Triangles from which the user is asked first: minutes of work and gigabytes of memory."""
 BYTES = {".stl": 270.0, ".obj": 50.0, ".off": 45.0, ".ply": 45.0, ".vtk": 45.0, ".vtu": 35.0, ".msh": 55.0}
-"""Bytes a triangle takes in a text file, its share of the points included."""
+"""Bytes per triangle in a text file, including its share of the points."""
 SECONDS, GIGABYTES = 30.0, 2.3
 """For a million triangles: to weld, check and measure them on one core, and the memory that takes (from 200,000)."""
 HEADER = 84
@@ -17,7 +17,7 @@ HEAD = 4096
 
 
 def triangle_count(path: Path) -> int:
-    """Triangles in a file, by its header where that says it, else by its size."""
+    """Number of triangles in a file, from its header if that states it, else from its size."""
     size = path.stat().st_size
     with open(path, "rb") as file:
         head = file.read(HEAD)
@@ -57,7 +57,7 @@ def check_whole(path: Path) -> None:
 
 
 def size_warning(path: Path) -> str | None:
-    """What a person should know before a file is read; None for one that takes no time to speak of."""
+    """A warning for the user before a large file is read; None for a small one."""
     count = triangle_count(path)
     if count < LARGE:
         return None

@@ -1,4 +1,4 @@
-"""What is wrong with a file that cannot be read, in words: nobody should have to know the reader's own errors."""
+"""Messages for files that cannot be read, so that users need not understand the errors of readers."""
 
 import gzip
 import lzma
@@ -47,11 +47,11 @@ PROMISES = {
     ".vtp": rb'NumberOf(Points|Polys)\s*=\s*"(\d+)"',
     ".msh": rb"\$(Nodes|Elements)\s+(\d+)\s",
 }
-"""Where a header says how much of what will follow."""
+"""Patterns of headers that state the number of elements that follow."""
 LEAST_BYTES = {".vtu": 1e-3, ".vtp": 1e-3}
 """Bytes that one of them takes at the very least: zlib packs a thousand to one. In the other formats two."""
 ENDS = {".vtu": b"</VTKFile>", ".vtp": b"</VTKFile>", ".msh": b"$EndElements"}
-"""What a whole file has near its end."""
+"""Text near the end of a complete file."""
 
 
 def check_promises(path: Path) -> None:
@@ -98,7 +98,8 @@ def unreadable(path: Path, reason: str) -> StudyError:
 
 
 def reason_of(path: Path, error: BaseException, output: str) -> str:
-    """Why a reader failed on the file, from the file first, then from the `output` of the reader, then its error."""
+    """Why a reader failed on the file: from the file itself, else from the `output` of the reader, else from its
+    error."""
     end = ENDS.get(path.suffix.lower())
     if (end and end not in tail(path)) or is_open_stl(path):
         return "it is cut short: its end is missing"
@@ -123,7 +124,7 @@ WORDS: tuple[tuple[tuple[type[BaseException], ...], str], ...] = (
 
 
 def sentence_in(text: str) -> str:
-    """The first line of a reader's own words that a person understands; "" where there is none."""
+    """The first understandable line of the output of a reader; "" if there is none."""
     for line in text.splitlines():
         line = " ".join(line.split()).removeprefix("Error: ").rstrip(".")
         if line and not re.search(r"Couldn't read|\w+Error\b|\w+Exception\b|Traceback|<class|0x[0-9a-f]{6}|/", line):

@@ -31,7 +31,7 @@ def read_points(path: Path) -> tuple[np.ndarray, dict[str, np.ndarray]]:
     try:
         with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
             grid = meshio.read(path)
-    except (Exception, SystemExit) as error:  # a file of another program: meshio's readers raise whatever they meet
+    except (Exception, SystemExit) as error:  # a file of another program: meshio's readers may raise any exception
         raise StudyError(f"{path.name} cannot be read as a grid ({str(error).splitlines()[:1]})") from error
     points = np.asarray(grid.points, dtype=np.float64)
     return points, {name: np.asarray(values) for name, values in grid.point_data.items()}

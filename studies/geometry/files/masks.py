@@ -35,9 +35,9 @@ class Mask:
 
     labels: integers, shape (a, b, c), 0 outside of everything
     affine: shape (4, 4), from the index of a voxel to its middle in the file's unit
-    unit: what the header says, or None
+    unit: the one stated in the header, or None
     names: name of a label where the file gives it one
-    by_custom: whether the header does not say the unit, and its format's usual one is taken
+    by_custom: whether the header states no unit, so that the usual one of the format is assumed
     """
 
     labels: np.ndarray
@@ -105,7 +105,7 @@ def load_nrrd(path: Path) -> Mask:
 
 
 def missing(name: str, path: Path) -> StudyError:
-    """What to say where the reader of an image is not installed."""
+    """The message if the reader of an image is not installed."""
     return StudyError(
         f"{path.name} is a label mask, and {name}, which reads it, is not installed; "
         "run pip install 'organbench[masks]'"
@@ -113,7 +113,7 @@ def missing(name: str, path: Path) -> StudyError:
 
 
 def unit_of(unit_name: str) -> str | None:
-    """One of our units, or None where the header does not say or says another."""
+    """One of UNITS, or None if the header states none or another."""
     return LONG_NAMES.get(unit_name.lower())
 
 

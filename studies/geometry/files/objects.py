@@ -19,7 +19,7 @@ OBJECT = re.compile(rb"^o[ \t]+(\S.*?)\s*$", re.MULTILINE)
 def read_objects(path: Path) -> Content:
     """All triangles of a file, each object where the file puts it and with its own number.
 
-    Khronos Group: glTF 2.0 specification, 2021. Raises whatever trimesh raises for a broken file.
+    Khronos Group: glTF 2.0 specification, 2021. Raises any exception of trimesh for a broken file.
     """
     scene = scene_of(path)
     points, triangles, part, names = [np.empty((0, 3))], [np.empty((0, 3), np.int64)], [np.empty(0, np.int64)], []

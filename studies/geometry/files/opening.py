@@ -1,4 +1,4 @@
-"""A mesh file of any format, opened: what it holds, or in words why it cannot be read."""
+"""Opens a mesh file of any format: returns its content, or raises an error with the reason."""
 
 import contextlib
 import io
@@ -23,10 +23,10 @@ OBJECTS = (".off", ".obj", ".glb", ".gltf")
 
 
 def opened(source: Source) -> Content:
-    """What a file holds of the part that is wanted, in the file's unit.
+    """The content of the requested part of a file, in the unit of the file.
 
     STL, PLY, VTK, VTU, MSH and more by meshio, OFF, OBJ and glTF by trimesh, VTP and surfaces in legacy VTK, label
-    masks in NIfTI and NRRD. Raises StudyError for what cannot be read, without cells, or without that part.
+    masks in NIfTI and NRRD. Raises StudyError for a file that cannot be read, or that lacks cells or the part.
     """
     path = source.path
     if not path.is_file():
@@ -39,7 +39,7 @@ def opened(source: Source) -> Content:
             content, remark = read(path, source.part)
     except StudyError:
         raise
-    # Foreign parsers raise whatever a broken file makes them trip over, and meshio even exits the process.
+    # External parsers may raise any exception for a broken file, and meshio even exits the process.
     except (Exception, SystemExit) as error:
         raise unreadable(path, reason_of(path, error, output.getvalue())) from error
     if remark:
@@ -55,7 +55,7 @@ def opened(source: Source) -> Content:
 
 
 def read(path: Path, part: str | None) -> tuple[Content, str | None]:
-    """The file by its format, and a remark. Raises whatever its reader raises."""
+    """The file by its format, and a remark. Raises any exception of its reader."""
     suffix = path.suffix.lower()
     if is_mask(path):
         return read_mask(path, part)

@@ -22,10 +22,10 @@ def read_mesh(path: str | Path | Source, unit: str | None = None, flip: bool = F
     """A closed surface or a tetrahedral body from any file that `opened` reads (STL, PLY, OBJ, VTK, glTF, masks, ...).
 
     path: a file, or a Source, which also has a scale or a part. unit: of the file's coordinates, one of UNITS; None:
-    what the file says, or metres. flip: turn an inside-out surface or negative tetrahedra round instead of refusing
-    them. Duplicate points are welded and points that nothing uses are left out; where a body has tetrahedra, triangles
-    stored beside them are left out too. Warns when the size does not fit the unit. Raises StudyError for a file that
-    cannot be read or whose mesh is not usable.
+    that stated in the file, or metres. flip: whether an inside-out surface or negative tetrahedra are reversed instead
+    of refused. Duplicate points are merged and unused points are left out; if a body has tetrahedra, its triangles are
+    left out too. Warns when the size does not fit the unit. Raises StudyError for a file that cannot be read or whose
+    mesh is not usable.
     """
     source = as_source(path, unit)
     name = source.path.name

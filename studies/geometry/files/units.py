@@ -1,4 +1,4 @@
-"""Units of length in files that do not name theirs: recognised by the size of organs, never taken without a word."""
+"""Units of length in files without a stated unit: recognised by the size of organs, and never assumed silently."""
 
 import hashlib
 import re
@@ -27,11 +27,12 @@ NAMES = {"m": "metres", "cm": "centimetres", "mm": "millimetres", "in": "inches"
 
 @dataclass(frozen=True)
 class Source:
-    """A mesh file, and how its numbers are to be taken."""
+    """A mesh file, with its unit, scale and part."""
 
     path: Path
     unit: str | None = None
-    """Of the coordinates, one of UNITS; None: what the file says, or metres where only they make an organ of it."""
+    """Of the coordinates, one of UNITS; None: that stated in the file, or metres if only these give the size of an
+    organ."""
     scale: float = 1.0
     """The coordinates are multiplied by this first."""
     longest_side: float | None = None
@@ -40,7 +41,7 @@ class Source:
     """Name or number of the part, or label of the mask; None: the largest, and of a mask the only one."""
 
     def __post_init__(self) -> None:
-        """Refuses what is no length."""
+        """Raises StudyError for invalid lengths."""
         object.__setattr__(self, "path", Path(self.path))
         name = self.path.name
         if self.unit is not None:
@@ -67,7 +68,7 @@ class Source:
 
     @property
     def sha256(self) -> str | None:
-        """Of the file's bytes (hex), by which it is known wherever it lies; None where it cannot be read."""
+        """SHA-256 of the bytes of the file (hex), which identifies it at any path; None if it cannot be read."""
         try:
             return hashlib.sha256(self.path.read_bytes()).hexdigest()
         except OSError:
@@ -75,7 +76,7 @@ class Source:
 
     @property
     def recipe(self) -> dict[str, object]:
-        """What of it decides a mesh besides the content of the file, JSON-able, without the place of the file."""
+        """The settings besides the content of the file on which a mesh depends, JSON-able, without the path."""
         given = {"scale": None if self.scale == 1.0 else self.scale, "longest_side": self.longest_side}
         return {key: value for key, value in (given | {"part": self.part}).items() if value is not None}
 
@@ -101,7 +102,7 @@ def check_unit(unit: str) -> None:
 
 
 def check_range(side: float, name: str, low: float = ABSURD[1], high: float = ABSURD[0]) -> None:
-    """Raise StudyError for a longest side [m] that no organ has; 0 and what is no number pass (others tell of them)."""
+    """Raise StudyError for a longest side [m] that no organ has; 0 and NaN pass, since other checks report them."""
     if side > high:
         raise StudyError(
             f"{name}: the longest side is {side:.3g} m; no organ is larger than {LARGEST:g} m: correct the unit or the "
@@ -128,7 +129,7 @@ def likely_units(side: float) -> list[str]:
 
 
 def unit_question(name: str, side: float) -> str:
-    """What a person has to know to answer which unit a file has whose longest side is `side`."""
+    """A question to the user for the unit of a file whose longest side is `side`, with the possible answers."""
     likely = likely_units(side)
     if likely:
         guess = " or ".join(NAMES[unit] for unit in likely)

@@ -15,7 +15,7 @@ from studies.geometry.mesh.organ_mesh import (
 from studies.geometry.mesh.quality import tetrahedron_radius_ratio, triangle_radius_ratio
 
 SLIVER = 1e-4
-"""Radius ratio under which a triangle or tetrahedron has no usable volume or normal, whatever it is used for."""
+"""Radius ratio below which a triangle or tetrahedron has no usable normal or volume for any purpose."""
 
 
 def check_surface(points: np.ndarray, triangles: np.ndarray, name: str = "the surface") -> None:

@@ -21,7 +21,7 @@ class OrganMesh:
     recipe: how to make it again, JSON-able
     outer_count: number of nodes of the outer surface, which come first of all (0 means all of `surface_count`); in a
         layered wall of which no element was halved node i + outer_count of the lumen faces node i
-    losses: of a mesh made from the surface in a file, how near it is to that (studies.geometry.scanned.fidelity)
+    losses: deviations of a mesh made from the surface in a file (studies.geometry.scanned.fidelity)
     cuts: name -> faces inside the body, shape (f, 3), along which a cut will open it, seen from in front of its plane
     """
 

@@ -52,7 +52,8 @@ class CurvedMesh:
 def true_surfaces(mesh: OrganMesh, shape: Shape | None = None) -> list[tuple[np.ndarray, Shape]]:
     """Triangles (t, 3) of each curved part of the boundary and the shape on whose f = 0 they lie.
 
-    shape: of a scan, whose recipe does not tell it. Raises StudyError for a mesh whose true shape is not known.
+    shape: the true shape of a scan, which its recipe does not contain. Raises StudyError for a mesh whose true shape is
+    unknown.
     """
     kind = mesh.recipe.get("kind")
     if kind == "ball_octant":

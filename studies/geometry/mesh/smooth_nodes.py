@@ -1,4 +1,4 @@
-"""Single nodes moved to where their worst tetrahedron is better."""
+"""Moves single nodes to positions at which their worst tetrahedron is better."""
 
 from collections.abc import Callable
 

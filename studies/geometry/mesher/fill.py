@@ -1,4 +1,4 @@
-"""Filling a closed surface with tetrahedra, and insisting on their quality."""
+"""Fills a closed surface with tetrahedra of sufficient quality."""
 
 import numpy as np
 

@@ -15,7 +15,7 @@ TRIANGLE, TETRAHEDRON = 2, 4
 
 @contextmanager
 def fresh_model(seed: int = 1, **options: float) -> Iterator[None]:
-    """A new gmsh with its own options; they would survive `clear`, so it is shut down at the end.
+    """A new gmsh session with default options. Options would survive `clear`, so the session is finalised at the end.
 
     One thread, an explicit seed and no user configuration make a mesh a function of its recipe.
     """
@@ -32,7 +32,7 @@ def fresh_model(seed: int = 1, **options: float) -> Iterator[None]:
             gmsh.option.setNumber(name, value)
         yield
     except Exception as error:
-        # gmsh raises bare Exception; our own sentences pass unchanged.
+        # gmsh raises bare Exception; StudyErrors pass unchanged.
         if type(error) is Exception:
             raise StudyError(f"gmsh gave up: {error}; try another node count, or smooth the surface") from error
         raise

@@ -39,7 +39,7 @@ MADE_ELSEWHERE = {
 }
 """Kinds of recipes that the module of all others does not make."""
 MAKERS = ("studies.geometry.mesher.organ_recipe", *dict.fromkeys(MADE_ELSEWHERE.values()))
-"""Modules that make meshes, some in a process of their own: no import leads to them."""
+"""Modules that make meshes, some in separate processes, so that no import refers to them."""
 
 
 def mesh_from(
@@ -166,7 +166,7 @@ def read_cached(path: Path, parts: tuple[str, ...]) -> dict[str, np.ndarray] | N
 
 
 def write_cached(path: Path, arrays: dict[str, np.ndarray]) -> None:
-    """Store under a name of its own, then rename: another process sees the whole file or none."""
+    """Stores under a temporary name, then renames, so that another process sees the whole file or none."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.NamedTemporaryFile(dir=path.parent, prefix=path.stem, suffix=".part", delete=False) as part:

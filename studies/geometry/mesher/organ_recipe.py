@@ -61,7 +61,8 @@ def mesh_shape(shape: Shape, recipe: dict[str, Any]) -> Arrays:
 
 
 def finish(shape: Shape, points: np.ndarray, triangles: np.ndarray, recipe: dict[str, Any]) -> Arrays:
-    """A surface on f = 0, filled as its recipe says; elements of a scan are as good as its folds allow."""
+    """A surface on f = 0, filled as its recipe says; for a scan elements of lower quality are accepted, since folds may
+    not allow better ones."""
     check_surface(points, triangles, shape.name)
     stage("filling")
     if not recipe["fill"]:

@@ -1,4 +1,4 @@
-"""A process that makes a mesh: followed stage by stage, and stopped when it never ends."""
+"""Runs a process that makes a mesh, reports its stages, and stops it if it takes too long."""
 
 import os
 import queue
@@ -31,9 +31,9 @@ def pipe_to_here() -> Iterator[int]:
 
 
 def followed(command: list[str], name: str, limit: float) -> tuple[int, str, str]:
-    """Run a command to its end, telling of each stage it prints and that it lives: exit code, last stage, last error.
+    """Runs a command to its end and logs each stage that it prints: (exit code, last stage, last error).
 
-    Its processor time is its own affair; by the clock it may take PATIENCE times `limit` [s].
+    The process limits its processor time itself; its wall time is limited to PATIENCE times `limit` [s].
     """
     paths = [str(ROOT), *filter(None, [os.environ.get("PYTHONPATH")])]
     one_thread = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}

@@ -1,4 +1,4 @@
-"""What the mesher is at: a line for each stage, from its process to whoever waits for it."""
+"""Progress of the mesher: a line for each stage, from its process to the process that waits for it."""
 
 import logging
 
@@ -9,5 +9,5 @@ BEAT = 20.0
 
 
 def stage(what: str) -> None:
-    """Says in the mesher's process what comes next; the process that waits reads it from standard output."""
+    """Reports the next stage in the mesher's process; the process that waits reads it from standard output."""
     print(what, flush=True)

@@ -78,19 +78,20 @@ def build_level(recipe: dict[str, Any], arrays: Arrays) -> Arrays:
 
 
 def solid_body(recipe: dict[str, Any], file: Surface) -> Surface:
-    """The surface of a file, or what it encloses where the recipe says "solid"."""
+    """The surface of a file, or with "solid" in the recipe the surface of its filled interior."""
     stage("distances to the surface of the file")
     return file if recipe.get("solid") is None else solidified(*file, recipe["solid"], recipe["name"])
 
 
 def smooth_body(recipe: dict[str, Any], body: Surface, cell: float) -> Surface:
-    """The surface, levelled where the recipe says so on cells of at most `cell` [m]."""
+    """The surface, smoothed if the recipe asks for it, on a grid with cells of at most `cell` [m]."""
     smooth = recipe["smooth"]
     return levelled(*body, cell, smooth, recipe["name"]) if smooth > 0 else body
 
 
 NEARNESS = (0.2, 0.1, 0.3)
-"""Distances over the size that the remesher keeps to, tried in turn: which one serves a thin margin best is chance."""
+"""Largest distances of the remesher from the surface, over the size, tried in turn: which one is best for a thin margin
+is unpredictable."""
 SPARE = 0.1
 """Share of the nodes that is put where the evenly spread ones leave the mesh farthest from its shape."""
 

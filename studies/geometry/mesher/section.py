@@ -29,7 +29,7 @@ ROUND = 16
 SHARP = 15.0
 """Degrees in a triangle of the section below which it keeps the body next to it from being filled."""
 FEWEST_CELLS = 30
-"""Tetrahedra below which a piece is no body of its own."""
+"""Fewest tetrahedra of a separate piece."""
 Surface = tuple[np.ndarray, np.ndarray]
 
 
@@ -118,7 +118,8 @@ def fill_cut(
         points = np.concatenate([points, new])
         sections.append(faces)
         blades.append(faces[blade])
-    # Every triangle bounds the body on its side of each plane; those of a section do so on both sides of their own.
+    # Every triangle bounds the body on its side of each plane; those of a section bound it on both sides of their
+    # plane.
     walls, sides = [triangles], [np.stack([_side(plane, points, triangles, shape.size) for plane in planes], axis=1)]
     for k, faces in enumerate(sections):
         side = np.stack([_side(plane, points, faces, shape.size) for plane in planes], axis=1)
@@ -203,7 +204,7 @@ def why_not_filled(points: np.ndarray, faces: np.ndarray, error: StudyError) -> 
 
 
 def _pieces(triangles: np.ndarray, count: int) -> list[np.ndarray]:
-    """The closed surfaces among triangles (t, 3), each by itself."""
+    """The separate closed surfaces among triangles (t, 3)."""
     pairs = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]]])
     graph = coo_array((np.ones(len(pairs)), pairs.T), shape=(count, count))
     label = connected_components(graph, directed=False)[1][triangles[:, 0]]

@@ -1,7 +1,7 @@
 """Process that meshes one recipe: `python -m studies.geometry.mesher.organ_recipe JOB.npz OUT.npz`, or scan_recipe.
 
-gmsh can hang without a message or crash; in a process of its own it harms nothing else. Scans have a process of their
-own kind because their compiled distances take half a second to import, which other meshes need not wait for.
+gmsh can hang without a message or crash; a separate process protects the caller. Scans use a separate module because
+their compiled distances take half a second to import.
 """
 
 import json
@@ -26,8 +26,8 @@ LEAST = 1e-3
 def work(build: Callable[[dict[str, Any], Arrays], Arrays], job_path: str, out_path: str, limit: str) -> int:
     """Reads the job, writes the mesh of `build` or the sentence of its StudyError; the exit code, 0 or 2.
 
-    Standard input is a pipe that the caller holds open: the process ends with it. It also ends after `limit` seconds of
-    processor time, whatever library it is in.
+    Standard input is a pipe that the caller holds open; the process ends when it closes. It also ends after `limit`
+    seconds of processor time, even inside a library.
     """
     end_after(lambda: os.read(0, 1))
     if hasattr(signal, "setitimer"):  # not on Windows, where the caller's clock alone decides

@@ -18,9 +18,9 @@ WIDEST = 0.3
 def vary(name: str, seed: int, spread: float = 0.2) -> dict[str, float]:
     """Parameters for `SHAPES[name]`, each within a factor 1 - spread to 1 + spread of its default; JSON-able.
 
-    All lengths share one random size and have a smaller part of their own; the wall varies by itself, because filling
-    thins it. The same seed gives the same organ. Raises StudyError for an unknown organ, a seed that is no whole number
-    from 0 on, or a spread outside 0 to WIDEST.
+    All lengths share one random factor and each has a smaller separate one; the wall varies independently, because
+    filling thins it. The same seed gives the same organ. Raises StudyError for an unknown organ, a seed that is no
+    whole number from 0 on, or a spread outside 0 to WIDEST.
     """
     shape = lookup(name, SHAPES, "organ")
     if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:

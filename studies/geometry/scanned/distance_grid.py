@@ -1,4 +1,5 @@
-"""The signed distance to a closed triangulation on a regular grid: what a scan is smoothed, closed and remeshed by."""
+"""The signed distance to a closed triangulation on a regular grid, with which a scan is smoothed, closed and
+remeshed."""
 
 import numpy as np
 from scipy.ndimage import distance_transform_edt
@@ -33,7 +34,7 @@ def squared_distance(corners: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
     """
     squared, owner, scratch = np.full(shape, np.inf), np.zeros(shape, np.uint32), np.empty((4, 3))
     band_distance_into(corners, BAND, scratch, squared, owner)
-    # A surface passes every grid point beside it within half the diagonal of a cell.
+    # The nearest grid points are within half the diagonal of a cell from the surface.
     nearest = distance_transform_edt(squared > 1.0, return_distances=False, return_indices=True)
     far_distance_into(corners, BAND, owner[tuple(np.asarray(nearest))], scratch, squared)
     return squared
@@ -43,7 +44,7 @@ def winding_number(points: np.ndarray, triangles: np.ndarray, axes: list[np.ndar
     """How often the surface winds round each grid point, shape (a, b, c): signed crossings of the ray downwards.
 
     Rays are moved off the grid by a tiny irrational fraction of a cell, so that none meets an edge; each edge is
-    evaluated from its lower to its higher node, so that the two triangles beside it agree about every ray.
+    evaluated from its lower to its higher node, so that its two triangles agree about every ray.
     """
     x, y, z = axes
     shift = 1e-7 * (x[1] - x[0]) * np.array([np.sqrt(2.0), np.sqrt(3.0)])

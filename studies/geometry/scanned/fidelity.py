@@ -64,7 +64,7 @@ def samples(points: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.n
 
 
 def warnings_of(lost: dict[str, Any]) -> list[str]:
-    """Sentences for what a person has to know; none where all is near."""
+    """Warnings for the user; none if all deviations are small."""
     sentences = []
     for key, what in (
         ("file_to_mesh", "this part of the file is missing from the mesh"),

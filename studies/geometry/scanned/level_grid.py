@@ -1,4 +1,4 @@
-"""Signed distances on a regular grid as a shape; what computes them is in a module of its own, compiled."""
+"""Signed distances on a regular grid as a shape; a separate, compiled module computes them."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -16,8 +16,8 @@ ROUND = 0.7
 def solidified(points: np.ndarray, triangles: np.ndarray, opening: float, name: str) -> Surface:
     """The outer sheet of what triangles (t, 3) on points (n, 3) [m] enclose, openings up to `opening` [m] wide closed.
 
-    The triangles may be open, doubled or one-sided. They are thickened by half the opening; what is then reachable from
-    outside is outside, and grows back by as much. Raises StudyError where nothing is enclosed.
+    The triangles may be open, doubled or one-sided. They are thickened by half the opening; the region that is then
+    reachable from outside is the outside, and grows back by the same amount. Raises StudyError if nothing is enclosed.
     """
     used = points[np.unique(triangles)]
     cell = FINEST * float(np.linalg.norm(np.ptp(used, axis=0)))

@@ -13,7 +13,8 @@ Level = Callable[[np.ndarray], np.ndarray]
 
 @dataclass(frozen=True)
 class Literature:
-    """What textbooks or series of patients say: the volume [mL] of an adult's organ, of a hollow one its content."""
+    """Values from textbooks or patient series: the volume [mL] of an adult's organ, for a hollow one that of its
+    content."""
 
     volume_ml: float
     source: str

@@ -12,7 +12,7 @@ BITS = 10
 def overlapping_boxes(low: np.ndarray, high: np.ndarray) -> Iterator[np.ndarray]:
     """Pairs (p, 2), lower index first, of boxes low, high (n, 3) that touch, in portions.
 
-    The boxes are put in order along a Z-curve; halves of halves of that order have boxes of their own (a tree without
+    The boxes are put in order along a Z-curve; repeated halves of that order have bounding boxes (a tree without
     pointers), and pairs of tree nodes are followed downwards as long as their boxes touch.
     """
     if not len(low):

@@ -19,7 +19,7 @@ CLOSE = 0.005
 FEWEST, MOST = 60, 20_000
 TRIES = 12
 QUALITY = 0.2
-"""Smallest radius ratio of a triangle that is accepted; below it the fill has slivers whatever the optimiser does."""
+"""Smallest radius ratio of a triangle that is accepted; below it the fill has slivers with any optimiser."""
 
 
 def surface_with(

@@ -1,4 +1,5 @@
-"""A region that is painted on the nodes of a surface, as few samples of it: the same part of space for every mesh."""
+"""A region painted on the nodes of a surface, represented by few samples, so that it is the same part of space for
+every mesh."""
 
 import numpy as np
 from scipy.spatial import KDTree
@@ -9,9 +10,9 @@ from studies.geometry.mesh.wall_layers import mean_edge
 from studies.geometry.shape.regions import PaintedRegion
 
 WIDTH = 0.75
-"""Of the Gaussian that rounds the border, over the mean edge there: it levels the steps from node to node."""
+"""Width of the Gaussian that smooths the border, over the mean edge there: it removes the steps from node to node."""
 SPARSE = 0.4
-"""Distance between samples over that to the border: below 1/2 the nearest sample is always of the right side."""
+"""Distance between samples over that to the border: below 1/2 the nearest sample is always on the correct side."""
 
 
 def painted_region(points: np.ndarray, triangles: np.ndarray, inside: np.ndarray, name: str) -> PaintedRegion:
@@ -39,7 +40,7 @@ def painted_region(points: np.ndarray, triangles: np.ndarray, inside: np.ndarray
 
 def thinned(points: np.ndarray, areas: np.ndarray, away: np.ndarray) -> np.ndarray:
     """Rows x, y, z [m], area [m²] of a part of the points (n, 3), as dense as their distance `away` (n,) [m] to the
-    other side asks for; each with the area of those that it stands for."""
+    other side requires; each with the area of the points that it represents."""
     tree, left, rows = KDTree(points), np.ones(len(points), bool), []
     for i in np.argsort(-away):
         if left[i]:

@@ -1,4 +1,4 @@
-"""On which side a point lies, decided without error: floating point first, whole numbers where it cannot know."""
+"""Exact decisions on which side a point lies: floating point first, integers if its error bound is not sufficient."""
 
 from collections.abc import Callable, Sequence
 

@@ -21,7 +21,7 @@ class RepairedSurface:
     points: np.ndarray
     triangles: np.ndarray
     remarks: tuple[str, ...]
-    """One sentence for each kind of change, for the person who gave the file."""
+    """One sentence for each kind of change, for the user."""
 
 
 def mend(points: np.ndarray, triangles: np.ndarray, name: str, holes: bool = False) -> RepairedSurface:

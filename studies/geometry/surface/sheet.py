@@ -15,7 +15,7 @@ from studies.geometry.mesh.organ_mesh import triangle_normals
 from studies.geometry.shape.regions import BallRegion, HalfSpace, Region
 
 LEAST_PIECE = 0.01
-"""Share of the volume below which a piece is no body of its own."""
+"""Smallest share of the volume of a separate piece."""
 GRAZING = 15.0
 """Degrees between plane and surface below which no element of the edge between them is well shaped: flat sides differ
 from the surface by some degrees, and meshes of 8 are refused."""
@@ -23,12 +23,12 @@ from the surface by some degrees, and meshes of 8 are refused."""
 
 @dataclass(frozen=True, eq=False)
 class Piece:
-    """What lies on one side of a plane, in one piece."""
+    """A connected piece of the body on one side of a plane."""
 
     surface: np.ndarray
     """Places on its part of the surface [m], (n, 3)."""
     share: float
-    """Of the whole volume."""
+    """Share of the whole volume."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,14 +38,14 @@ class Sheet:
     trace: np.ndarray
     """Ends of the straight parts of the outline of the section [m], (e, 2, 3)."""
     angles: np.ndarray
-    """Between the plane and the surface at each of them [degrees], (e,)."""
+    """Angle between the plane and the surface at each part of the outline [degrees], (e,)."""
     crossed: np.ndarray
     """Whether each triangle of the surface has corners on both sides, (t,)."""
     pieces: list[Piece]
 
 
 def sheet_of(plane: HalfSpace, points: np.ndarray, triangles: np.ndarray) -> Sheet:
-    """Where a plane meets a closed surface of `triangles` (t, 3), and what it leaves on either side."""
+    """The section of a closed surface of `triangles` (t, 3) by a plane, and the pieces on either side."""
     level = plane.level(points)
     front = level > 0
     count = front[triangles].sum(axis=1)
@@ -80,11 +80,11 @@ def _pieces(points: np.ndarray, triangles: np.ndarray, plane: HalfSpace) -> list
     pairs = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]]])
     graph = coo_array((np.ones(len(pairs)), pairs.T), shape=(len(points), len(points)))
     label = connected_components(graph, directed=False)[1][triangles[:, 0]]
-    # Seen from a point of the plane the section adds nothing.
+    # Relative to a point of the plane the section adds no volume.
     a, b, c = (points - np.asarray(plane.point))[triangles].transpose(1, 0, 2)
     volume = np.einsum("ij,ij->i", a, np.cross(b, c)) / 6.0
     pieces = [(np.unique(triangles[label == k]), float(volume[label == k].sum())) for k in np.unique(label)]
-    # A dent of the surface is no piece: it is missing in the largest one.
+    # A dent of the surface is not a piece: its volume is missing in the largest piece.
     dents = sum(volume for _, volume in pieces if volume <= 0)
     pieces = sorted((piece for piece in pieces if piece[1] > 0), key=lambda piece: -piece[1])
     return [(nodes, volume + (dents if k == 0 else 0.0)) for k, (nodes, volume) in enumerate(pieces)]

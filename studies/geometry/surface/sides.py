@@ -1,4 +1,4 @@
-"""The sides of a surface mesh as elements have them: straight, or quadratic with their middles on the true surface."""
+"""The sides of a surface mesh: straight, or quadratic with mid-side nodes on the true surface."""
 
 from collections.abc import Sequence
 from functools import cache
@@ -10,7 +10,7 @@ from studies.geometry.shape.levelset import Shape, project
 from studies.geometry.shape.regions import Region
 
 PARTS = 4
-"""Each side of a facet is cut into so many where distances are measured: 15 places a facet."""
+"""Divisions of each side of a facet for measuring distances: 15 points per facet."""
 OUTLINE = 1e-9
 """Distance [m] within which a node is on an outline, far above rounding and far below an edge."""
 
@@ -95,7 +95,8 @@ def lattice(parts: int = PARTS) -> tuple[np.ndarray, np.ndarray]:
 
 
 def shape_functions(local: np.ndarray, curved: bool) -> np.ndarray:
-    """Of a facet at barycentric coordinates (p, 3): (p, 3) linear, or (p, 6) quadratic, corners first."""
+    """Shape functions of a facet at barycentric coordinates (p, 3): linear (p, 3), or quadratic (p, 6), corners
+    first."""
     if not curved:
         return local
     return np.concatenate([local * (2.0 * local - 1.0), 4.0 * local * np.roll(local, -1, axis=1)], axis=1)

@@ -18,7 +18,7 @@ from studies.geometry.surface.first_surface import neighbour_mean
 FLOORS = (0.35, 0.2, 0.1, 0.05)
 """Smallest triangle radius ratio accepted in successive rounds: the good moves first, relaxation between rounds."""
 POOR = 0.4
-"""Triangles below this radius ratio are worth turning an edge for."""
+"""Radius ratio of a triangle below which edges are turned to improve it."""
 
 
 def outlined(

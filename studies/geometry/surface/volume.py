@@ -1,7 +1,8 @@
-"""A surface mesh with exactly the volume of its shape: its nodes a little off it, along the normals.
+"""Gives a surface mesh exactly the volume of its shape by moving its nodes slightly along the normals.
 
-A polyhedron whose nodes lie on a round surface is too small, by 1 to 3 % at 550 nodes. The nodes go out where the
-triangles around them cut the shape off, and in where they bridge a hollow, so they stay as near as the triangles are.
+A polyhedron whose nodes lie on a round surface is too small, by 1 to 3 % at 550 nodes. Nodes move outward where the
+triangles around them cut off the shape, and inward where they bridge a hollow, so nodes remain as near to the shape as
+the triangles.
 """
 
 from collections.abc import Callable, Sequence
@@ -22,14 +23,15 @@ from studies.geometry.shape.regions import ON_CURVE, Region
 from studies.geometry.surface.intersections import crossing_triangles
 
 EXACT, ENOUGH = 1e-6, 1e-4
-"""Relative deviation of the volume at which the search ends, and that is accepted: a tenth of what is promised."""
+"""Relative deviation of the volume at which the search ends, and the largest that is accepted: a tenth of what is
+promised."""
 ROUNDS = 12
 FARTHEST = 0.25
-"""Of the mean edge around a node: how far it may go."""
+"""Largest motion of a node, over the mean edge around it."""
 WORST = 0.15
-"""Radius ratio below which the move may bring no triangle, or no worse than it was."""
+"""Radius ratio below which the motion may not bring a triangle, unless the triangle was worse before."""
 Keeper = Callable[[np.ndarray], np.ndarray]
-"""Moved points (n, 3) -> where they may be."""
+"""Moved points (n, 3) -> their allowed positions."""
 
 
 def with_volume(
@@ -106,7 +108,7 @@ def mean_edges(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
 
 
 def outline_keeper(points: np.ndarray, regions: Sequence[Region]) -> Keeper:
-    """What puts moved nodes back where the outlines need them: those of an outline onto it, others onto their side."""
+    """A function that moves nodes of an outline back onto it, and others back to their side of it."""
     reach = 10 * ON_CURVE * float(np.linalg.norm(np.ptp(points, axis=0)))
     before = [region.level(points) for region in regions]
 

@@ -1,1 +1,1 @@
-"""Two results folders side by side: what moved between two versions, machines or people."""
+"""Compares two results folders: changes between two versions, machines or users."""

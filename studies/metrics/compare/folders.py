@@ -26,16 +26,16 @@ Row = dict[Hashable, Any]
 METRIC = re.compile(r"^(?P<name>\w+) \[(?P<unit>[^\]]+)\]$")
 STATUS = "status"
 ROW = ("scene", "body", "method", "nodes", "law", "dt/dt_c", "recipe")
-"""Columns of a table that say which case a row is."""
+"""Columns of a table that identify the case of a row."""
 MORE: tuple[tuple[str, ...], ...] = ((), ("law",), ("step",), ("law", "step"), ("recipe",))
-"""What a name holds besides body, nodes and method, in the order in which it is tried."""
+"""Further columns in the name of a case, besides body, nodes and method, in the order in which they are tried."""
 TIMES = tuple(metric.name for metric in METRICS if metric.spread is not None)
 SPEEDS = tuple(metric.name for metric in METRICS if metric.spread is not None and metric.better == "higher")
-"""Metrics that depend on the machine; of these the ones that are speeds."""
+"""TIMES: metrics that depend on the machine; SPEEDS: those of them that are speeds."""
 JUDGED = tuple(metric.name for metric in METRICS if metric.quantity not in (None, *ALWAYS))
 """Metrics that compare with the reference."""
 REFERENCE = "reference"
-"""Column that names it; tables of before published sets lack it."""
+"""Column that names the reference; older tables, without published sets of references, lack it."""
 
 
 class Named(NamedTuple):
@@ -48,7 +48,7 @@ class Named(NamedTuple):
     nodes: str
     law: str
     step: str
-    """Over the stability limit."""
+    """Time step over the stability limit."""
     recipe: str
 
 
@@ -62,7 +62,7 @@ class Change:
     old: float | str
     new: float | str
     floor: float
-    """How well it is known, the larger of both, in its unit; NaN where it is not stated."""
+    """Its uncertainty, the larger of both, in its unit; NaN if none is stated."""
     verdict: Verdict
 
     @property
@@ -73,30 +73,30 @@ class Change:
 
 @dataclass(frozen=True)
 class Comparison:
-    """All that two folders share, and how many rows they do not."""
+    """All changes of the cases in both folders, and the number of other rows."""
 
     changes: list[Change]
     only_old: int
     only_new: int
 
     machines: tuple[str | None, str | None]
-    """Ids of the machines that measured the old and the new times; None where nothing says so."""
+    """Ids of the machines that measured the old and the new times; None if a folder does not record it."""
 
     @property
     def same_machine(self) -> bool:
-        """Whether times are compared: one machine has measured both, and both folders say so."""
+        """Whether times can be compared: both folders record the same machine."""
         old, new = self.machines
         return old is not None and old == new
 
     @property
     def moved(self) -> list[Change]:
-        """What moved, accuracy before times."""
+        """The changes that are not negligible, accuracy before times."""
         moved = [change for change in self.changes if change.verdict == Verdict.MOVED]
         return sorted(moved, key=lambda change: change.is_time)
 
     @property
     def time_ratio(self) -> float:
-        """Median of new over old computing times [1]; NaN where both folders share none."""
+        """Median of new over old computing times [1]; NaN if both folders have none in common."""
         pairs = [(c.old, c.new) if c.metric not in SPEEDS else (c.new, c.old) for c in self.changes if c.is_time]
         ratios = [new / old for old, new in pairs if old > 0 and new > 0]  # type: ignore[operator]
         return float(np.median(ratios)) if ratios else float("nan")
@@ -106,7 +106,7 @@ class Comparison:
         return pd.DataFrame([change.case._asdict() | _numbers(change) for change in self.changes])
 
     def counts(self, times: bool) -> dict[Verdict, int]:
-        """How many times, or how many other numbers, there are of each verdict, in the order of Verdict."""
+        """The count of each verdict among times (`times`), or among other numbers, in the order of Verdict."""
         verdicts = [change.verdict for change in self.changes if change.is_time == times]
         return {verdict: verdicts.count(verdict) for verdict in Verdict}
 
@@ -118,8 +118,8 @@ def _numbers(change: Change) -> dict[str, object]:
 def compare(old: Path, new: Path) -> Comparison:
     """Every metric of every case that both folders have in the table of a study.
 
-    Raises StudyError for a folder that is not there or has no table, for a table that lacks what names its rows, and
-    for two folders without a common case.
+    Raises StudyError for a missing folder, a folder without a table, a table without the columns that identify its
+    rows, and two folders without a common case.
     """
     mine, theirs = tables_of(old), tables_of(new)
     changes, only_old, only_new = list[Change](), 0, 0
@@ -154,7 +154,7 @@ def tables_of(folder: Path) -> dict[str, dict[Key, Row]]:
 
 
 def _read(path: Path) -> dict[Key, Row]:
-    """Nothing where its rows name no recipe."""
+    """The rows of a table by key; empty if they name no recipe."""
     try:
         table = pd.read_csv(path)
     except (ValueError, OSError) as error:
@@ -166,7 +166,7 @@ def _read(path: Path) -> dict[Key, Row]:
 
 
 def changes_of(study: str, old: Row, new: Row, same_bits: bool) -> list[Change]:
-    """How a case ended and all its metrics that one of the folders has."""
+    """Changes of the status of each case and of all its metrics that one of the folders has."""
     case = Named(study, *(_text(new.get(name, "")) for name in ROW))
     changes = []
     if old.get(STATUS) != new.get(STATUS):
@@ -196,7 +196,7 @@ def _floor(row: Row, name: str, unit: str) -> float:
 
 def equal_records(old: Path, new: Path, study: str) -> set[Key]:
     """(scene, recipe) of the cases whose records both folders hold, with equal fields. Records that cannot be read, or
-    of a scene that there is no more, count as different."""
+    whose scene no longer exists, count as different."""
     mine, theirs = ({path.name: path for path in record_files(folder, study)} for folder in (old, new))
     pairs = set()
     for name in sorted(set(mine) & set(theirs)):
@@ -218,7 +218,8 @@ def _equal(one: Record, other: Record) -> bool:
 
 
 def labels_of(cases: Iterable[Named]) -> dict[Named, str]:
-    """Body, nodes and method of each case, and as much more as tells the cases of a study and scene apart."""
+    """A label of each case: body, nodes and method, and as many further columns as distinguish the cases of a study and
+    scene."""
     alike = defaultdict[tuple[str, ...], set[Named]](set)
     for case in cases:
         alike[case.study, case.scene, _case_label(case, ())].add(case)

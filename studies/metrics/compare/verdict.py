@@ -1,13 +1,13 @@
-"""What a change of a number means, given how well the number is known."""
+"""The meaning of a change of a number, given its uncertainty."""
 
 from enum import StrEnum
 
 ROUND_OFF = 1e-5
-"""Relative: tables have six digits."""
+"""Relative difference below which numbers are equal: tables have six digits."""
 
 
 class Verdict(StrEnum):
-    """How a number of one folder stands to that of the other."""
+    """Relation of a number in one folder to that in the other."""
 
     SAME_BITS = "same bits"
     ROUND_OFF = "round-off"
@@ -30,8 +30,8 @@ MEANING: dict[Verdict, str] = {
 
 
 def verdict_of(old: float, new: float, floor: float, same_bits: bool) -> Verdict:
-    """The verdict on a number that was `old` and is `new`. floor: how well it is known, NaN where that is not stated;
-    same_bits: whether the records that it was read off are equal."""
+    """The verdict on a number that was `old` and is `new`. floor: its uncertainty, NaN if none is stated; same_bits:
+    whether the records from which it was computed are equal."""
     change = abs(new - old)
     if change != change:
         return Verdict.NOT_RESOLVABLE

@@ -1,1 +1,1 @@
-"""Frame times that can be trusted."""
+"""Reliable measurement of frame times."""

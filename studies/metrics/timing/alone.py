@@ -1,4 +1,4 @@
-"""One command at a time measures on a results folder: two at once would slow each other down."""
+"""A lock that lets only one command at a time measure on a results folder: two would slow each other down."""
 
 import os
 import warnings
@@ -8,15 +8,15 @@ from pathlib import Path
 
 try:
     import fcntl
-except ImportError:  # not on POSIX: a second command is not kept waiting there
+except ImportError:  # not POSIX: there a second command does not wait
     fcntl = None
 
 
 @contextmanager
 def alone(root: Path, waits: Callable[[], object] = lambda: None) -> Iterator[None]:
-    """Inside, no other command that asks for the same folder. `waits` is called first where another is inside.
+    """Inside, no other command holds the lock of the same folder. `waits` is called first if another one does.
 
-    A lock of the system: it is free again as soon as its process is gone. Warns where the disk knows no locks.
+    The operating system frees the lock when its process ends. Warns if the file system has no locks.
     """
     path = root / "cache" / "timing.lock"
     path.parent.mkdir(parents=True, exist_ok=True)

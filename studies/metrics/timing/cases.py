@@ -1,4 +1,5 @@
-"""Frame times of stored cases, in separate files: timing never touches physics (studies.metrics.timing.protocol)."""
+"""Frame times of stored cases, in separate files, so that timing never changes results
+(studies.metrics.timing.protocol)."""
 
 import time
 import warnings
@@ -20,13 +21,14 @@ from studies.store.record import Record, Status, write_record
 
 REPEATS, FEWEST = 5, 1
 BUDGET = 6.0
-"""Of the repeats of a case [s]: a run of some seconds holds thousands of steps, and is repeated less often."""
+"""Time for the repeats of a case [s]: a run of several seconds contains thousands of steps, and is repeated less
+often."""
 WARM_UP = 1.0
-"""Of a run before anything is measured, at most [s]: it compiles what the case needs."""
+"""Longest run before measurement [s], which compiles the code for the case."""
 
 
 def timing_file(root: Path, study: str, case: Case) -> Path:
-    """Where this machine's frame times of a case lie."""
+    """Path of the frame times of a case on this machine."""
     return timing_path(case_path(root, study, case), machine_id())
 
 
@@ -36,7 +38,8 @@ def timing_of(record: Record) -> FrameTiming:
 
 
 def time_cases(root: Path, study: str, cases: Iterable[Case], on_case: Callable[[str], None]) -> None:
-    """Times cases alone on one pinned core. Cases that differ by method only take turns, so that their ratio is fair.
+    """Times cases on one pinned core, without other load. Cases that differ only by method are interleaved, so that
+    their ratio is fair.
 
     Raises StudyError when a file cannot be written.
     """
@@ -48,7 +51,7 @@ def time_cases(root: Path, study: str, cases: Iterable[Case], on_case: Callable[
             started = time.perf_counter()
             with watching() as watch:
                 with warnings.catch_warnings():
-                    warnings.simplefilter("ignore", UserWarning)  # the run has stored what preparing it warns of
+                    warnings.simplefilter("ignore", UserWarning)  # the run has stored the warnings of its preparation
                     setups = {case.key: prepare(case).setup for case in group}
                 contestants = {key: (lambda s=setup: simulate(s).frame_ns) for key, setup in setups.items()}
                 measured = interleave(contestants, max(map(repeats_for, setups.values())), warmups=0)
@@ -61,7 +64,7 @@ def time_cases(root: Path, study: str, cases: Iterable[Case], on_case: Callable[
 
 
 def repeats_for(setup: Setup) -> int:
-    """How often the run is timed, from what its first frames take."""
+    """Number of repeats of the run, from the time of its first frames."""
     simulate(setup, time_limit=0.0)
     first = simulate(setup, time_limit=WARM_UP)
     frames = max(first.good_frames, 1)
@@ -70,7 +73,7 @@ def repeats_for(setup: Setup) -> int:
 
 
 def write_timing(root: Path, study: str, case: Case, timing: FrameTiming, seconds: float | None = None) -> None:
-    """Stores frame times next to the record of their case, and the seconds that measuring them took."""
+    """Stores frame times next to the record of their case; `seconds`: time spent on measuring them."""
     if not (timing.frame_ns > 0).all():
         raise StudyError(f"case {case.name} broke off while it was timed; run it again")
     record = new_record(

@@ -44,11 +44,11 @@ class FrameTiming:
             raise StudyError(f"stage times need one name per row, not {len(self.stages)} names")
 
     def attributes(self) -> dict[str, int | None]:
-        """What goes into the attributes of a timing record."""
+        """The attributes of a timing record."""
         return {"core": self.core, "threads": self.threads, "repeats": len(self.frame_ns)}
 
     def fields(self) -> dict[str, Field]:
-        """What goes into the fields of a timing record."""
+        """The fields of a timing record."""
         values = {"frame_ns": self.frame_ns}
         if self.stage_ns is not None:
             values |= {"stage_ns": self.stage_ns, "stages": np.array(self.stages)}
@@ -57,12 +57,12 @@ class FrameTiming:
 
 @contextmanager
 def pinned(threads: int = 1) -> Iterator[int | None]:
-    """Inside, all threads of this process stay on as many cores as `threads` (the last allowed ones: the first serves
-    interrupts); compiled code uses no more, linear algebra one. Gives the last core's number, or None where the
-    system cannot pin. Raises StudyError where the process may use fewer cores.
+    """Inside, all threads of this process are pinned to `threads` cores, the last allowed ones, since the first handles
+    interrupts; compiled code uses as many threads, linear algebra one. Yields the number of the last core, or None if
+    the system cannot pin. Raises StudyError if the process may use fewer cores.
 
-    A pool of a linear algebra library that waits for work keeps its core busy for 0.1 s: next to it, on one core, a
-    kernel seemed to take 2.5 times as long.
+    Idle threads of a linear algebra library keep a core busy for 0.1 s: on the same core a kernel seemed to take 2.5
+    times as long.
     """
     cores = sorted(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else list(range(os.cpu_count() or 1))
     if threads > min(len(cores), config.NUMBA_NUM_THREADS):  # pyright: ignore[reportAttributeAccessIssue]
@@ -84,7 +84,7 @@ def pinned(threads: int = 1) -> Iterator[int | None]:
 
 
 def _keep_on(cores: set[int]) -> None:
-    # The call alone moves only the calling thread; threads of the linear algebra libraries exist already.
+    # The call without a thread id pins only the calling thread; threads of the linear algebra libraries already exist.
     tasks = os.listdir("/proc/self/task") if os.path.isdir("/proc/self/task") else ["0"]
     for task in tasks:
         try:
@@ -98,10 +98,10 @@ def interleave(
 ) -> dict[str, np.ndarray]:
     """Calls every contestant `repeats` times, in turns, and stacks what they return: name -> (repeats, F) [ns].
 
-    A contestant measures itself and returns its frame times [ns], shape (F,). A slow spell of the machine falls
-    on all of them; each round starts with another one. The garbage collector rests inside a round. The results of
-    `warmups` first rounds (compilation, caches) are thrown away. Raises StudyError when nothing would be measured,
-    or when a contestant returns another number of frames than before.
+    A contestant measures itself and returns its frame times [ns], shape (F,). A slow phase of the machine affects all
+    of them; each round starts with a different one. The garbage collector is off inside a round. The results of the
+    first `warmups` rounds (compilation, caches) are discarded. Raises StudyError if nothing would be measured, or if a
+    contestant returns a different number of frames than before.
     """
     names = list(contestants)
     if not names or repeats < 1 or warmups < 0:

@@ -13,7 +13,7 @@ from studies.runs.case import Case
 from studies.runs.prepare import prepare
 
 SECONDS = 12.0
-"""Of computing, without compiling and meshing."""
+"""Computing time [s], without compiling and meshing."""
 PROBED = 3
 """Frames from which the time of the others is estimated."""
 

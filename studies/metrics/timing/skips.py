@@ -1,4 +1,5 @@
-"""What a scene may leave out of a step: when it does, and the same run with it, to see what that saves."""
+"""Stages of a step that a scene may not need: when they are skipped, and the same run with them, to measure the
+saving."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -9,10 +10,10 @@ from massspring.kernels.probe.arrays import COMPARED, IN_CONTACT, LEFT_BEHIND, T
 from massspring.layout.jacobian_pattern import volume_rows
 
 FAR = Sphere((1e3, 0.0, 0.0), 1e-3)
-"""An obstacle that nothing reaches."""
+"""An obstacle that is never touched."""
 FAR_PROBE = Probe((1e3, 0.0, 0.0))
 FAINT = (0.0, 0.0, 1e-280)
-"""Gravity that changes no sum [m/s²]."""
+"""Gravity too small to change any sum [m/s²]."""
 
 
 @dataclass(frozen=True)
@@ -21,11 +22,11 @@ class Skip:
 
     name: str
     left_out: Callable[[Setup], bool]
-    """Whether a set-up leaves it out."""
+    """Whether a set-up skips the stage."""
     included: Callable[[Setup, State], tuple[Setup, State]]
     """The same run with the stage."""
     remark: Callable[[Setup, State], str] = lambda setup, state: ""
-    """How much was left out, from the state after the run."""
+    """Text on how much was skipped, from the state after the run."""
 
 
 def _with_far(setup: Setup, state: State) -> tuple[Setup, State]:
@@ -48,7 +49,7 @@ def _with_friction(setup: Setup, state: State) -> tuple[Setup, State]:
 
 def _with_rows(setup: Setup, state: State) -> tuple[Setup, State]:
     kept = setup.inside.body.kept
-    assert isinstance(kept, Volumes)  # asked of bodies that keep one volume
+    assert isinstance(kept, Volumes)  # called only for bodies that keep one volume
     return setup, replace(state, rows=volume_rows(kept, setup.body.node_count))
 
 
@@ -58,7 +59,8 @@ def _awake(setup: Setup, state: State) -> tuple[Setup, State]:
 
 
 def _pairs(setup: Setup, state: State) -> str:
-    """Boxes compared, pairs tested and triangles left behind, of all pairs of tips and triangles."""
+    """Text with the shares of boxes compared, pairs tested and triangles left behind among all pairs of tips and
+    triangles."""
     assert state.probing is not None
     steps = setup.clock.frames * setup.clock.steps
     pairs, counts = state.probing.near.size, state.probing.counts

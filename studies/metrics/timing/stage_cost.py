@@ -1,7 +1,8 @@
-"""What a step of a scene costs, stage by stage, what the scene does not need, and what leaving that out saves.
+"""Cost of a step of a scene by stages, stages that the scene does not need, and the saving by skipping them.
 
 The stages are those that the frame loop of the method times (massspring.kernels.jit.stage_clock): real steps of the
-real run, on one pinned core. The same frames without them are run in turns; what they take beyond is the rest.
+real run, on one pinned core. The same frames are also run without timing of stages, in turn; their time beyond the sum
+of the stages is the rest.
 """
 
 from dataclasses import replace
@@ -31,27 +32,28 @@ from studies.runs.prepare import prepare
 
 FRAMES, REPEATS = 100, 5
 BUDGET = 4.0
-"""Time for the repeats [s]: the next turn is left out when it would take longer than that; the first never is."""
+"""Time for the repeats [s]: a turn that would exceed it is left out, except the first."""
 EXPENSIVE = 5.0
-"""Times the run as it is, from where one with a stage is run once only: that is far from the noise."""
+"""Factor on the time of the original run beyond which a run with an added stage is made only once: the difference is
+far above noise."""
 ENDS = 100_000
-"""Ends of stages in a row, to learn what one costs."""
+"""Number of stage ends in a row from which the cost of one is measured."""
 CALL = "call of the frame"
-"""From Python into compiled code and back, with the copies that leave the old state as it was."""
+"""Row for the call from Python into compiled code and back, with the copies that leave the old state unchanged."""
 ROWS = (*STAGES, CALL)
 PATHS, RECORDING = "paths of obstacles and targets", "recording"
 ENERGIES = "energies: no metric reads them"
-"""Left out of recording, unless a case asks for them."""
+"""Row for the energies, which are not recorded unless a case needs them."""
 PLAIN, TIMED = "as it is", "with marks"
 STAGE, SKIPPED, FRAME = "stage", "skipped", "per frame"
 
 
 TimedFrames = tuple[np.ndarray, np.ndarray, State]
-"""Time of each frame [ns], (F,); of its ROWS, less what timing them cost, (rows, F); the last state."""
+"""Time of each frame [ns], (F,); times of its ROWS without the cost of timing [ns], (rows, F); the last state."""
 
 
 def run_frames(setup: Setup, state: State, times: StageTimes = UNTIMED, frames: int | None = None) -> TimedFrames:
-    """Runs the first `frames` of a set-up, or all. Raises MassSpringError for a run that breaks off."""
+    """Runs the first `frames` of a set-up, or all. Raises MassSpringError for a run that diverges."""
     state = replace(state, diagnostics=state.diagnostics._replace(stage_times=times))
     frames = setup.clock.frames if frames is None else frames
     frame_ns, stage_ns = np.zeros(frames), np.zeros((len(ROWS), frames))
@@ -64,7 +66,7 @@ def run_frames(setup: Setup, state: State, times: StageTimes = UNTIMED, frames: 
         state = setup.method.advance(state, boundary)
         frame_ns[frame] = perf_counter_ns() - begin
         if times.on[0]:
-            # A stage of some nanoseconds may seem to cost less than its end.
+            # The time of a very short stage may be less than the cost of timing it.
             stage_ns[:BETWEEN_FRAMES, frame] = np.maximum(
                 times.spent[:BETWEEN_FRAMES] - price * times.ended[:BETWEEN_FRAMES], 0.0
             )
@@ -88,7 +90,7 @@ def _end_stages(times: StageTimes, count: int):
 
 
 def end_stage_ns() -> float:
-    """What the end of a stage costs [ns]."""
+    """Cost of ending a stage [ns]."""
     times = new_stage_times()
     _end_stages(times, 1)
     begin = perf_counter_ns()
@@ -129,8 +131,8 @@ def _timed(setup: Setup, frames: int | None = None) -> TimedFrames:
 
 
 def _in_turns(runs: dict[str, partial[TimedFrames]], repeats: int, budget: float) -> dict[str, list[TimedFrames]]:
-    """Every run up to `repeats` times, in turns, compiled before; one that is `EXPENSIVE`, once. No turn begins that
-    would end after `budget` [s], but the first."""
+    """Makes every run up to `repeats` times, in turn, after compilation; an EXPENSIVE one only once. Except for the
+    first, a turn is not started if it would end after `budget` [s]."""
     for run in runs.values():
         run(frames=1)
     turns: dict[str, list[TimedFrames]] = {name: [] for name in runs}
@@ -146,7 +148,7 @@ def _in_turns(runs: dict[str, partial[TimedFrames]], repeats: int, budget: float
             turns[name].append(run())
             took = float(turns[name][-1][0].sum())
             shortest[name] = min(took, shortest[name]) if turn else took
-        longest = perf_counter_ns() - start  # later turns leave out what is expensive, so they take no longer
+        longest = perf_counter_ns() - start  # later turns skip expensive runs, so they take no longer
     return turns
 
 
@@ -158,7 +160,7 @@ def _fastest(timed: list[TimedFrames]) -> np.ndarray:
 
 
 def _per_frame(setup: Setup) -> dict[str, float]:
-    """What is done once per frame, outside its time, and what recording the energies too would take: median [ns]."""
+    """Time of the work once per frame, outside the frame time, and the extra time to record energies: medians [ns]."""
     clock = setup.clock
     recorded = (setup.body, clock, setup.obstacles, len(setup.attachments), frozenset[int]())
     bare, full = Recorder(*recorded, ()), Recorder(*recorded, EXTRA)

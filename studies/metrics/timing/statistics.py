@@ -1,4 +1,4 @@
-"""What frame times say, and what they cannot say: percentiles, missed deadlines, ratios with their spread."""
+"""Statistics of frame times: percentiles, missed deadlines, ratios with their spread."""
 
 from dataclasses import dataclass
 
@@ -15,7 +15,7 @@ CONFIDENCE = 0.9  # five repeats give 0.9375; fewer than five cannot resolve any
 def percentiles(frame_ns: np.ndarray) -> dict[str, float]:
     """p50, p95, p99 and max of all frames of all repeats [ns]; frame_ns of any shape.
 
-    Of the frames that were measured, none between: the p99 is a time some frame really took.
+    Percentiles are not interpolated: each is the time of a measured frame.
     """
     p50, p95, p99 = np.percentile(frame_ns, [50, 95, 99], method="higher")
     return {"p50": float(p50), "p95": float(p95), "p99": float(p99), "max": float(np.max(frame_ns))}
@@ -28,7 +28,7 @@ def missed(frame_ns: np.ndarray, deadlines_ms: tuple[float, ...] = DEADLINES_MS)
 
 
 def kernel_ns(frame_ns: np.ndarray) -> float:
-    """What a frame costs when nothing disturbs [ns]: the median over frames of the fastest repeat of each.
+    """Time of a frame without disturbance [ns]: the median over frames of the fastest repeat of each.
 
     frame_ns: (repeat, F); every repeat computes the same frames.
     """
@@ -55,11 +55,11 @@ class Ratio:
 
 
 def ratio_with_spread(a: np.ndarray, b: np.ndarray) -> Ratio:
-    """How many times longer a frame of `a` takes than one of `b`; both (repeat, F) [ns], measured in turns.
+    """Ratio of the frame time of `a` to that of `b`; both (repeat, F) [ns], measured in turn.
 
-    Each repeat gives the ratio of the median frames of one round, so that a slow spell of the machine, which hits both,
-    cancels. Their median is the answer; its interval is the sign test's: between the k-th smallest and the k-th
-    largest ratio, no assumption on the distribution (Conover, Practical Nonparametric Statistics, ch. 3.2).
+    Each repeat gives the ratio of the median frames of one round, so that a slow phase of the machine, which affects
+    both, cancels. The result is their median; its interval is that of the sign test: between the k-th smallest and the
+    k-th largest ratio, without assumptions on the distribution (Conover, Practical Nonparametric Statistics, ch. 3.2).
     Raises StudyError when the repeats cannot be paired.
     """
     a, b = np.atleast_2d(a), np.atleast_2d(b)

@@ -35,7 +35,7 @@ LOOKS = {
     "timed-out": (GREY, "\\\\\\\\"),
     "unexplained": (VERMILLION, "++++"),
 }
-"""Colour and hatch of each status: no sign of the colour alone. Trials that are refused are no runs."""
+"""Colour and hatch of each status: the hatch repeats the information of the colour. Refused trials are not runs."""
 EDGES = 2.0 ** np.arange(-4.0, 2.1, 1.0)
 """Of the ranges of the step over the stability limit."""
 REFUSED = "refused"

@@ -1,5 +1,5 @@
-"""Errors over a population: the share of members that are at most so far off, a line for each body; and what the error
-of 95 of 100 members costs in computing time."""
+"""Errors over a population: the share of members with at most a given error, a line for each body; and the error bound
+of 95 of 100 members against computing time."""
 
 from collections.abc import Sequence
 

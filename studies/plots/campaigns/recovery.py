@@ -69,7 +69,7 @@ def _draw_start(axes: Axes, group: Sequence[Run], looks: dict[BodyRecipe, BodyLo
 
 
 def _colour(case: Case) -> str:
-    """That of the method; with other settings than the default ones, its own here."""
+    """The colour of the method; a method with other than default settings has a separate colour here."""
     return CHOSEN if chosen_settings(case.method) else method_colour(case.method.name)
 
 

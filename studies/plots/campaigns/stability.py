@@ -50,7 +50,7 @@ def _draw_map(axes: Axes, group: Sequence[Run]) -> None:
     for run, x, y in zip(group, dt, factor, strict=True):
         colour, marker = STATUS_LOOKS[run.record.status]
         (left, right), (low, high) = edges_x[float(x)], edges_y[float(y)]
-        # No sign of the colour alone: the marker says the same.
+        # The marker repeats the information of the colour.
         axes.add_patch(Rectangle((left, low), right - left, high - low, color=colour, alpha=0.22, linewidth=0))
         axes.plot(x, y, marker=marker, color=colour, linestyle="", markersize=8, markeredgecolor="white")
     _draw_limit(axes, group)

@@ -99,7 +99,8 @@ def draw_cut(axes: Axes, mesh: OrganMesh) -> None:
     light = smooth_normals(mesh.points, mesh.triangles)[source]
     draw_faces(axes, corners, light, uniform(TISSUE, len(corners)), FRONT, edges=0.4)
     face = cut_face(mesh.points, mesh.tetrahedra, normal, height)
-    # Nothing behind the plane hides its face: drawn last, and turned to the eye whatever the order of its corners.
+    # The cut face is in front of everything: it is drawn last, with its normals towards the eye for any order of its
+    # corners.
     turned = np.cross(face[:, 2] - face[:, 0], face[:, 3] - face[:, 1]) @ normal < 0
     face[turned] = face[turned][:, ::-1]
     draw_faces(axes, face, np.tile(normal, (len(face), 1)), uniform(CUT, len(face)), FRONT, edges=0.4)

@@ -83,7 +83,7 @@ def _window(seen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _draw(axes: Axes, x: np.ndarray, triangles: np.ndarray, tip: np.ndarray, edges: float) -> None:
-    """Organ and probe in one heap, so that what is nearer hides what is behind."""
+    """Draws organ and probe as one set of faces, so that nearer faces hide those behind."""
     corners = x[triangles.astype(np.int64)]
     shaft, around = rod(tip)
     normals = np.concatenate([smooth_normals(x, triangles.astype(np.int64)), around])

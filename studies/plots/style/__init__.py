@@ -1,1 +1,1 @@
-"""What all charts share: page, colours, three-dimensional pictures."""
+"""Common parts of all charts: page, colours, three-dimensional pictures."""

@@ -1,4 +1,4 @@
-"""What tells the bodies of one chart apart: a name, a line and a marker for every body recipe that occurs in it."""
+"""Name, line and marker for every body recipe in a chart."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -20,7 +20,7 @@ OPTIONS = ("law", "axis", "weights", "stiffness", "nodes")
 
 @dataclass(frozen=True)
 class BodyLook:
-    """How a body is called and drawn in one chart."""
+    """Name, line, marker and colour of a body in one chart."""
 
     name: str
     line: LineStyleType

@@ -1,4 +1,4 @@
-"""What tells the rungs from the paper's body to quadratic elements apart in a chart: a name, a colour and a marker."""
+"""Families of bodies, from the paper's body to quadratic elements, with a name, a colour and a marker in charts."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -59,14 +59,14 @@ CONTESTANTS: dict[tuple[str, str], Family] = {
     ("linear_modes", "quadratic"): Family("linear modes", MUTED[5], (4, 1, 0)),
     ("elastic_response", "quadratic"): Family("elastic response, precomputed", MUTED[9], (4, 0, 20)),
 }
-"""What is taken instead of mass-spring bodies, by method and kind of body."""
+"""Alternatives to mass-spring bodies, by method and kind of body."""
 OUR_METHODS = tuple(method.name for method in (*METHODS, *LITERATURE))
 WHOLE = "implicit_volume"
 """The method that needs no name."""
 
 
 def family_of(case: Case) -> Family:
-    """The family of a case; what belongs neither to the ladder nor to the elements is grey, under its own name."""
+    """The family of a case; a case in neither FAMILIES nor CONTESTANTS is grey, with the name of its method."""
     body = case.body
     element = CONTESTANTS.get((case.method.name, body.kind))
     if element is not None:

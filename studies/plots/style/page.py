@@ -41,7 +41,7 @@ def page(width: float, height: float) -> Figure:
 
 
 def panels(figure: Figure | SubFigure, rows: int, columns: int, **options: object) -> np.ndarray:
-    """Axes of shape (rows, columns), whatever their number."""
+    """Axes as an array of shape (rows, columns), also for a single panel."""
     return figure.subplots(rows, columns, squeeze=False, **options)  # pyright: ignore[reportCallIssue, reportArgumentType]
 
 
@@ -100,7 +100,7 @@ def _fitting(columns: int, labels: Sequence[str], width: float) -> int:
 
 @styled
 def blank(title: str, reason: str) -> Figure:
-    """A page that says why there is no chart."""
+    """A page with the reason why there is no chart."""
     figure = page(8, 2.5)
     axes = figure.subplots()
     axes.set_axis_off()

@@ -48,7 +48,7 @@ def vertex_normals(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
 
 
 def shade(normals: np.ndarray, colours: np.ndarray) -> np.ndarray:
-    """Lit colours (t, 3) of faces with unit normals (t, 3) in the camera's frame and own colours (t, 3)."""
+    """Lit colours (t, 3) of faces with unit normals (t, 3) in the camera's frame and unlit colours (t, 3)."""
     facing = normals @ (LIGHT / np.linalg.norm(LIGHT))
     # Light that reaches round the body (half-Lambert) keeps the colour, which carries meaning, on the dark side.
     brightness = DARKEST + RANGE * (0.5 + 0.5 * facing) ** WRAP
@@ -85,7 +85,7 @@ def draw_faces(
     order = np.argsort(seen[:, :, 2].mean(axis=1), kind="stable")
     order = order[facing[order]]
     lit = shade(camera.see(normals[order]), colours[order])
-    # A face without a line of its own colour leaves a hair of what is behind it along its rim.
+    # Without a line in its colour a face would show a thin gap along its edges.
     line, width = (EDGE * lit, edges) if edges else (lit, HAIR)
     polygons = PolyCollection(seen[order][:, :, :2], facecolors=lit, edgecolors=line, linewidths=width)  # pyright: ignore[reportArgumentType]
     polygons.set_joinstyle("round")

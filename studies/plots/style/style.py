@@ -109,7 +109,7 @@ VECTOR: dict[Any, Any] = {"svg.fonttype": "none", "svg.hashsalt": "organbench", 
 
 
 def styled(build: Callable[P, R]) -> Callable[P, R]:
-    """Runs `build` under matplotlib's defaults and SHEET, whatever the user's own settings are."""
+    """Runs `build` under matplotlib's defaults and SHEET, independent of the user's settings."""
 
     @functools.wraps(build)
     def under_sheet(*args: P.args, **kwargs: P.kwargs) -> R:
@@ -133,7 +133,8 @@ def save(figure: Figure, path: Path, dpi: int = DPI) -> None:
 
 
 def drawing(figure: Callable[[R], Figure], dpi: int = DPI) -> Callable[[R, Path], None]:
-    """What a chart is called by: the figure of what is given as a PNG file. Raises StudyError as `save` does."""
+    """Decorates a function that makes a figure: the result writes the figure as a PNG file. Raises StudyError as `save`
+    does."""
 
     def draw(shown: R, path: Path) -> None:
         """Writes the chart as PNG."""

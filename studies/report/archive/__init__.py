@@ -1,1 +1,1 @@
-"""Results that can be handed on and kept: one file that draws its own charts again."""
+"""Archives of results: one file that contains the code to draw its charts again."""

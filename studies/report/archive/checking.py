@@ -1,4 +1,4 @@
-"""Whether an archive, packed or unpacked, is what was packed."""
+"""Checks that a packed or unpacked archive is unchanged."""
 
 import hashlib
 import os
@@ -21,11 +21,12 @@ Opener = Callable[[str], IO[bytes]]
 
 
 def check(path: Path) -> int:
-    """Compares every file of a zip, or of a folder that one was unpacked to, with its checksum; how many there are.
+    """Compares every file of a zip, or of a folder that one was unpacked to, with its checksum; returns the number of
+    files.
 
-    Files that others added to a folder are left alone; only regular files of the folder are opened, and nothing is
-    unpacked. Raises StudyError for what is no archive or is encrypted, DamagedFile with the first file that is missing,
-    has changed or lies outside.
+    Additional files in a folder are ignored; only regular files of the folder are opened, and nothing is unpacked.
+    Raises StudyError for a file that is no archive or is encrypted, DamagedFile with the first file that is missing,
+    has changed, or has a path outside the archive.
     """
     if path.is_dir():
         return _compare(path, partial(_of_folder, path))
@@ -39,7 +40,7 @@ def check(path: Path) -> int:
 
 
 def _of_folder(folder: Path, name: str) -> IO[bytes]:
-    """A file of a folder, opened. A pipe or a device would be read for ever, also where a link leads to it."""
+    """Opens a regular file of a folder. A pipe or a device, or a link to one, could be read without end."""
     file = folder / name
     if file.exists() and not file.is_file():
         raise DamagedFile(f"{folder}: {name} is not a regular file: {AGAIN}")

@@ -57,7 +57,7 @@ class Packed:
     size: int
     """Bytes."""
     remarks: list[str]
-    """What report.html had no room for, or cannot show."""
+    """Sentences on what report.html had no room for, or cannot show."""
 
 
 def chosen(root: Path, catalogue: Sequence[Study]) -> list[Study]:
@@ -115,7 +115,7 @@ def gather(root: Path, studies: Sequence[Study], stage: Path) -> list[str]:
 
 
 def bring(source: Path, target: Path) -> None:
-    """The same file under another name where the disk allows it, else a copy; nothing where there is none."""
+    """A hard link to the file if the disk allows it, else a copy; nothing if the file does not exist."""
     if target.exists() or not is_there(source):
         return
     target.parent.mkdir(parents=True, exist_ok=True)

@@ -1,4 +1,4 @@
-"""The table of the league: a row for each engine, scene and mesh, read off the stored entries."""
+"""The table of the league: a row for each engine, scene and mesh, computed from the stored entries."""
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
@@ -20,7 +20,7 @@ from studies.store.record import read_record
 TABLE = "league.csv"
 COLUMNS = ("force_end", "mean_error", "volume_worst", "penetration")
 PROFILED = {"force_end": SOLID[0], "mean_error": SOLID[1]}
-"""Quantities of profiles -> what is usually enough [%]; all scenes of the set are of solid organs."""
+"""Quantities of profiles -> default target [%]; all scenes of the set have solid organs."""
 COST, COUNT = "cost [s/s]", "evaluations [1/s]"
 """Computing time, and evaluations of all forces, for a simulated second."""
 ROUNDING = 1e-6
@@ -78,7 +78,7 @@ def pairs() -> dict[tuple[str, str], float]:
 
 
 def tolerance(name: str, factor: float, bar: float) -> float:
-    """`factor` of what is usually enough, and never finer than the reference is known [%]."""
+    """`factor` times the default target [%], but at least the uncertainty of the reference."""
     return max(factor * PROFILED[name], bar)
 
 
@@ -99,7 +99,7 @@ def profile(
     rows: Sequence[Row], engine: str, factor: float, bars: Mapping[tuple[str, str], float], budget: str = COST
 ) -> list[tuple[float, float]]:
     """(budget, share of the pairs that are solved within the tolerance for at most this budget), ascending; a pair
-    counts from its cheapest entry that is good enough on, and not at all where no cost is known."""
+    counts from the cost of its cheapest sufficient entry on, and not at all if no cost is known."""
     cheapest: dict[tuple[str, str], float] = {}
     for pair, row in solutions(rows, engine, factor, bars):
         if row[budget] == row[budget]:
@@ -146,7 +146,7 @@ def _card(name: str, rows: Sequence[Row], bars: Mapping[tuple[str, str], float])
 
 
 def _range(rows: Sequence[Row], column: str) -> str:
-    """ "1.2 to 41": smallest and largest size; a dash where nothing is known, 0 below ROUNDING."""
+    """ "1.2 to 41": smallest and largest size; a dash if nothing is known, 0 below ROUNDING."""
     values = [abs(row[column]) if abs(row[column]) > ROUNDING else 0.0 for row in rows if row[column] == row[column]]
     if not values:
         return "–"

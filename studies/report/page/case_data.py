@@ -1,4 +1,4 @@
-"""What the page shows of one case, or of an entry from outside: words, histories, and its surface next to that of the
+"""Data of one case, or of an external entry, for the page: texts, histories, and its surface next to that of the
 reference."""
 
 from collections.abc import Mapping
@@ -19,7 +19,7 @@ from studies.store.record import Status
 from studies.store.schema import SURFACE
 
 BINS = 40
-"""Stretches of a history; of each the smallest and the largest value are shown."""
+"""Intervals of a history; the smallest and the largest value of each are shown."""
 COMPARED = "surface"
 """Quantity that a scene must allow where points are to be compared: a body that may turn or slip has none."""
 
@@ -104,7 +104,7 @@ def histories(run: Run) -> dict[str, Any]:
 
 
 def probes_force(run: Run) -> bool:
-    """Whether what the scene probes is there: bodies that only fall have no obstacle and are held nowhere."""
+    """Whether the scene has the obstacle or held region that it probes; bodies that only fall have neither."""
     scene = run.case.scene
     return scene.probed.number < len(scene.obstacles if scene.probed.what == "obstacle" else scene.held)
 
@@ -181,7 +181,7 @@ def obstacle_of(obstacle: Obstacle, times: np.ndarray) -> dict[str, Any]:
 
 
 def merged(one: Mapping[str, Any], other: Mapping[str, Any]) -> dict[str, Any]:
-    """Two views of the same case, of two studies: what one lacks, the other has; recorded positions go before those at
+    """Merges the data of the same case from two studies; recorded positions take precedence over those at
     checkpoints."""
     both = {**other, **one, "histories": {**other["histories"], **one["histories"]}}
     replays = [view["replay"] for view in (one, other) if "replay" in view]
@@ -203,7 +203,7 @@ def entry_data(run: Run, scene: str) -> dict[str, Any]:
         "about": f"{case.scene.title}. Computed by another program and judged like our own runs; it ended {outcome}.",
         "again": f"organbench judge {scene} {file if record.fields else 'FILE'} --name {name}",
         "duration": case.scene.duration,
-        # One number is known of its computing time: it stands in the table.
+        # Its computing time is a single number, which is in the table.
         "histories": {what: values for what, values in histories(run).items() if what != "frame"},
     }
     if run.reference is not None:

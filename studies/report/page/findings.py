@@ -1,4 +1,4 @@
-"""What the tables of a results folder say, in a sentence each, with the numbers and how well they are known."""
+"""Findings from the tables of a results folder: a sentence each, with numbers and their uncertainties."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -8,25 +8,25 @@ from studies.base.counting import counted
 from studies.metrics.cells import plain, value_cell
 
 Row = Mapping[str, Any]
-"""Of a table as `study_table` makes it; None where a number is not known."""
+"""Row of a table of `study_table`; None for an unknown number."""
 Tables = Mapping[str, Sequence[Row]]
 VOLUME, FORCE, MEAN = "volume_worst [%]", "force_end [%]", "mean_error [%]"
 FRAME, REAL = "frame_time [ms]", "real_time [s/s]"
 RECIPE = ("scene", "body", "law", "nodes", "stiffness")
-"""What a body with and without a constraint share."""
+"""Columns that are equal for a body with and without a constraint."""
 KEPT, FREE = "implicit_volume", "free"
 CONTESTED = {FORCE: "force", MEAN: "mean displacement error", VOLUME: "worst volume", REAL: "speed"}
 """Numbers in which entries from outside and our runs are compared."""
 MOST_NAMED = 6
 """Numbers of entries that a finding names."""
 HALF = 0.51
-"""Share of the step limit up to which a step is the usual one, and above whose half it is no fine one [1]."""
+"""Largest share of the step limit of a usual step; a step below half of it is fine [1]."""
 RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 @dataclass(frozen=True)
 class Finding:
-    """A number and what it says."""
+    """A number and its meaning."""
 
     title: str
     number: str
@@ -34,15 +34,15 @@ class Finding:
 
 
 def findings(tables: Tables) -> list[Finding]:
-    """Those that the tables of the studies, by name, bear; each from rows that ended well. All but the last are of our
-    own runs."""
+    """The findings from the tables of the studies, by name, each from rows that ended well. All but the last refer to
+    our runs."""
     ours = {name: [row for row in table if not row.get("entry")] for name, table in tables.items()}
     candidates = [each(ours) for each in (volume, one_volume, nearest_force, cost, real_time, limit)]
     return [finding for finding in (*candidates, entries(tables)) if finding is not None]
 
 
 def volume(tables: Tables) -> Finding | None:
-    """How well volumes are kept, and what the same bodies lose without."""
+    """How well volumes are kept, and how much volume the same bodies lose without a constraint."""
     pairs = _pairs(_joined(tables, VOLUME))
     if not pairs:
         return None
@@ -58,7 +58,7 @@ def volume(tables: Tables) -> Finding | None:
 
 
 def one_volume(tables: Tables) -> Finding | None:
-    """What forces are worth in bodies that keep one volume."""
+    """How accurate forces are in bodies that keep one volume."""
     rows = [row for row in _ended_well(tables.get("volume_loss", ()), FORCE) if row["method"] == KEPT]
     if not rows:
         return None
@@ -126,7 +126,7 @@ def real_time(tables: Tables) -> Finding | None:
 
 
 def limit(tables: Tables) -> Finding | None:
-    """Whether the step limit says where runs break."""
+    """Whether the step limit predicts at which step runs break."""
     rows = [row for row in tables.get("stability_map", ()) if row.get("dt/dt_c") is not None]
     if not rows:
         return None
@@ -183,7 +183,7 @@ def _joined(tables: Tables, *columns: str) -> list[Row]:
 
 
 def _ended_well(table: Sequence[Row], *columns: str) -> list[Row]:
-    """Rows with numbers in all these columns."""
+    """Rows with status ok and numbers in all these columns."""
     return [row for row in table if row["status"] == "ok" and all(row.get(name) is not None for name in columns)]
 
 

@@ -40,7 +40,7 @@ JUDGED = ("force_end", "mean_error", "real_time")
 
 
 def unbroken(text: str) -> str:
-    """With numbers that no line end parts from their uncertainty and unit."""
+    """The text with non-breaking spaces between numbers, their uncertainty and unit."""
     return text.replace(" ± ", "\u00a0±\u00a0").replace(" %", "\u00a0%").replace(" × ", "\u00a0×\u00a0")
 
 
@@ -121,7 +121,7 @@ def _metric_cell(row: Mapping[str, Any], metric: Any) -> Cell:
         return "number", "", MISSING
     floor = row.get(f"{metric.name} floor [{metric.unit}]")
     doubtful = metric.name in str(row.get(UNRESOLVED) or "").split()
-    # A volume is compared with the body's own: the reference's floor is none of its.
+    # A volume is compared with the rest volume of the body, so the uncertainty of the reference does not apply.
     uncertainty = float("nan") if floor is None or metric.name == "volume_worst" else float(floor)
     cell = value_cell(float(value), uncertainty, signed=metric.name in SIGNED, unresolved=doubtful)
     return "number", f"{abs(float(value)):.6g}", cell

@@ -21,7 +21,7 @@ def pack_series(values: np.ndarray) -> dict[str, Any]:
     """Numbers (n,), NaN and infinities as missing, each rounded to 1/131,000 of their range."""
     finite = np.isfinite(values)
     low, high = (float(end) for end in (values[finite].min(), values[finite].max())) if finite.any() else (0.0, 0.0)
-    # Where all are equal, or a float apart, every level means the same.
+    # If all are equal up to round-off, every level has the same value.
     scale = LEVELS / (high - low) if high - low > np.finfo(float).tiny * LEVELS else 0.0
     levels = np.full(len(values), LEVELS + 1)
     levels[finite] = np.rint((values[finite] - low) * scale).astype(int)
@@ -34,7 +34,7 @@ def pack_frames(positions: np.ndarray, size: float) -> dict[str, Any]:
     extent = float((positions.max(axis=(0, 1)) - low).max())
     step = max(STEP * size, extent / DEEPEST)
     levels = np.rint((positions - low) / step).astype(np.int64)
-    # The way of one coordinate of one node after the other, low bytes before high ones: like stands beside like.
+    # Ordered by coordinate and node over time, all low bytes before all high ones, so that similar bytes are adjacent.
     change = np.ascontiguousarray(np.diff(levels, axis=0, prepend=0).astype("<i2").transpose(2, 1, 0))
     planes = change.view(np.uint8).reshape(-1, 2).T.tobytes()
     return {"shape": list(positions.shape[:2]), "low": low.tolist(), "step": step, "data": _deflated(planes)}

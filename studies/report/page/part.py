@@ -1,4 +1,4 @@
-"""What the page shows of one study, gathered while its runs are at hand and kept until they change."""
+"""Data of one study for the page, collected while its runs are loaded and stored until they change."""
 
 import hashlib
 import json
@@ -32,7 +32,7 @@ ID = re.compile("[0-9a-f]+")
 
 
 ABOUT = ("name", "question", "word")
-"""Of a study, what the page says of it."""
+"""Fields of a study that the page shows."""
 
 
 def part_path(root: Path, study: Study) -> Path:
@@ -86,7 +86,7 @@ def _digest(content: bytes) -> bytes:
 
 def other_studies(root: Path, studies: Sequence[Study]) -> tuple[list[Study], list[str]]:
     """Studies whose part is kept in `root` though they are not among `studies`: those of the user's files, and of a
-    folder of surfaces. Each is empty but for what the page says of it, and no file of the user is run for it.
+    folder of surfaces. Each has only the fields that the page shows; no file of the user is run.
 
     Also a sentence for each study that is stored and has no part, or an older one.
     """
@@ -124,8 +124,8 @@ def _scene_word(study: Study, scene: str) -> str:
 
 
 def run_id(run: Run) -> str:
-    """The same for runs with the same numbers, whatever else is recorded; of an entry the same in all studies
-    with its scene."""
+    """An id that is the same for runs with the same numbers, independent of additional recorded fields; for an entry
+    the same in all studies with its scene."""
     return key_hash(run.record.key if is_entry(run.case) else run.case.replaced(recorded=()).key)
 
 

@@ -1,4 +1,4 @@
-"""The reference as the page draws it: its own surface at rest and at every checkpoint, not the nodes of a case."""
+"""The reference for the page: the surface of its mesh at rest and at every checkpoint."""
 
 from dataclasses import replace
 from itertools import product

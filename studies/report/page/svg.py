@@ -1,4 +1,4 @@
-"""Charts of matplotlib as SVG inside a page: small, with names of their own, and with a title for screen readers."""
+"""Charts of matplotlib as SVG inside a page: small, with unique ids, and with a title for screen readers."""
 
 import base64
 import html
@@ -28,12 +28,12 @@ DESCRIBED = (
     "font-size, font-family, font-weight, font-style, href, patternUnits, patternTransform, clipPathUnits"
 )
 ATTRIBUTES = frozenset(DESCRIBED.split(", "))
-"""What a chart of matplotlib is made of. All else is left out, whoever wrote the file: scripts, what reacts to events,
-foreign elements, links."""
+"""Attributes in charts of matplotlib. Everything else is removed from any file: scripts, event handlers, foreign
+elements, links."""
 OWN = re.compile(r"#[\w.-]+|data:image/png;base64,[A-Za-z0-9+/=\s]+")
 """What an element may refer to: another one of its file, or a picture that it brings along."""
 ELSEWHERE = re.compile(r"url\(\s*(?!#)|[@\\]|position", re.IGNORECASE)
-"""In a style or an attribute: what reaches out of the chart."""
+"""Parts of a style or an attribute that refer to something outside the chart."""
 
 
 def inline(text: str, name: str, title: str) -> str:

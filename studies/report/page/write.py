@@ -1,6 +1,6 @@
 """report.html: findings, one case, charts and the table of a results folder in one file of at most LIMIT bytes.
 
-Cases that have no room in it lie in FOLDER beside it, a file each, which the page loads when they are opened.
+Cases for which it has no room are in FOLDER next to it, a file each, which the page loads when a case is opened.
 """
 
 import base64
@@ -30,7 +30,7 @@ FOLDER = "report-cases"
 LIMIT = 3_000_000
 """Bytes of the page; its folder may hold as many cases as there are."""
 DETAILS = ("histories", "reference", "replay", "why")
-"""What a case keeps in a file of its own where the page has no room for it."""
+"""Fields of a case that are stored in a separate file if the page has no room for them."""
 SCRIPTS = (
     "data.js",
     "table.js",
@@ -56,9 +56,9 @@ class Page:
 def write_page(
     root: Path, studies: Sequence[Study], league: Sequence[Mapping[str, Any]] = ()
 ) -> tuple[Path | None, list[str]]:
-    """Writes the page of what is kept of `studies` and of others in `root` (studies.report.page.part), and its folder;
-    None where nothing is. And what could not be drawn or is older, in sentences. league: the cards of its engines.
-    Raises StudyError when something cannot be written."""
+    """Writes the page and its folder from the stored parts (studies.report.page.part) of `studies` and of others in
+    `root`. Returns its path, None if nothing is stored, and sentences on parts that could not be drawn or are older.
+    league: the cards of its engines. Raises StudyError when something cannot be written."""
     others, remarks = other_studies(root, studies)
     parts = []
     for study in (*studies, *others):
@@ -79,7 +79,7 @@ def write_page(
 
 
 def _remove_others(folder: Path, names: set[str]) -> None:
-    """Files of cases that an earlier page loaded. Raises StudyError where one cannot be removed."""
+    """Removes files of cases of an earlier page, except `names`. Raises StudyError if one cannot be removed."""
     for path in folder.glob("*.js"):
         if path.name not in names:
             try:
@@ -89,8 +89,8 @@ def _remove_others(folder: Path, names: set[str]) -> None:
 
 
 def joined_cases(parts: Sequence[Part]) -> dict[str, Any]:
-    """Cases of all studies by id; the same one of several studies once, with all that is known of it. Errors of all
-    replays of a scene know the largest of them."""
+    """Cases of all studies by id; a case of several studies once, with the data of all. All replays of a scene get the
+    largest error among them."""
     cases: dict[str, Any] = {}
     for part in parts:
         for number, case in part["cases"].items():
@@ -104,7 +104,7 @@ def joined_cases(parts: Sequence[Part]) -> dict[str, Any]:
 
 
 def joined_rows(rows: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
-    """A row per case: what one study of it did not measure is that of the next, and all are named."""
+    """A row per case: values that one study did not measure come from the next, and all its studies are named."""
     by_case: dict[str, dict[str, Any]] = {}
     for row in rows:
         one = by_case.setdefault(row["case"], {**row, "study": ""})
@@ -169,7 +169,7 @@ def page(
     names = [study.name for study, _ in parts]
     script = "\n".join((ASSETS / name).read_text(encoding="utf-8") for name in SCRIPTS)
     studies = [study for study, _ in parts]
-    # A study of a FILE is the user's own, and so are its scenes.
+    # A study named by a FILE, and its scenes, are the user's.
     own = {row["scene"] for study, part in parts if study.word for row in part["best"]}
     best = own_first(joined_best([part["best"] for _, part in parts], case_rows), own)
     text = TEMPLATES.get_template("page.html").render(

@@ -41,14 +41,14 @@ class Stored:
 
     @property
     def physics(self) -> str:
-        """Its case without what else is recorded: the same for runs with the same numbers."""
+        """Its case without additional recorded fields: the same for runs with the same numbers."""
         data = json.loads(self.header.key)
         data.pop("recorded", None)
         return json.dumps(data, sort_keys=True)
 
     @property
     def words(self) -> tuple[str, str]:
-        """What it is called: the name of its case, which several may share, and its file's, which none does."""
+        """Its names: that of its case, which several runs may share, and the unique one of its file."""
         return self.header.name, self.path.stem
 
 

@@ -63,7 +63,7 @@ class _References:
 def view(root: Path, words: Sequence[str], own: Sequence[Scene] = ()) -> View:
     """The runs below `root` that words name (a scene, a case, a results file), with the reference of their scene.
 
-    own: scenes of the user beside those of SCENES.
+    own: scenes of the user, in addition to SCENES.
 
     Raises StudyError for a word that names nothing stored, for cases of several scenes or with other checkpoints, and
     where nothing can be read.
@@ -97,7 +97,7 @@ def _run(stored: Stored) -> Run:
 def _shown(stored: Stored, run: Run, references: _References) -> Shown:
     status = run.record.status
     name = stored.path.stem if status == Status.OK else f"{stored.path.stem} ({status})"
-    # The folder of a file that was named outside the results has its own references.
+    # A file outside the results folder uses the references of its folder.
     return shown_run(run, references.of(stored.path.parent.parent, run.case.scene), name)
 
 

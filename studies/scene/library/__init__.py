@@ -39,7 +39,7 @@ SCENES: tuple[Scene, ...] = (
 )
 
 JUDGED: tuple[Scene, ...] = tuple(scene for scene in SCENES if scene.reference is not None)
-"""Scenes with a reference: a study may ask how accurate a run of theirs is."""
+"""Scenes with a reference, in which studies can measure accuracy."""
 
 CUT: tuple[Scene, ...] = (
     BALL_INCISED,
@@ -52,8 +52,8 @@ CUT: tuple[Scene, ...] = (
     SHELL_OPENED,
     STOMACH_OPENED,
 )
-"""Scenes that cut their organ. They are not in SCENES: surface bodies cannot run those with a front inside the organ,
-and half of the methods none of them."""
+"""Scenes that cut their organ. They are not in SCENES, since surface bodies cannot run scenes with a front inside the
+organ, and half of the methods support no cuts."""
 
 __all__ = [
     "BALL_BISECTED",

@@ -20,6 +20,6 @@ SPLEEN_SAG = Scene(
     gravity=GRAVITY,
     damping=15.0,
     reference=ReferencePlan(),
-    # The force is the weight, whatever the model: it tells nothing.
+    # The force is the weight for any model, so it gives no information.
     quantities=("surface", "interior", "silhouette", "volume"),
 )
