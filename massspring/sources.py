@@ -1,7 +1,7 @@
-"""The state of the code as one number: what was computed, meshed or compiled is current while it stays the same.
+"""The state of the code as one number: a result, a mesh or compiled code is current while the number stays the same.
 
 The number of a module covers its own syntax tree, without docstrings, and those of all own modules that it imports,
-directly or through others. So an edit makes stale what can depend on it and nothing else, and rewording makes nothing
+directly or through others. So an edit makes stale only what can depend on it, and new words make nothing
 stale.
 """
 
@@ -19,7 +19,7 @@ from typing import NamedTuple
 from massspring.errors import MassSpringError
 
 OWN = ("massspring", "reference_fem", "studies")
-"""The packages of this distribution, installed side by side; other packages are known by their versions."""
+"""The packages of this distribution, installed together; of other packages the versions count."""
 APART = (
     "massspring.compile_cache",
     "massspring.compile_parts",
@@ -27,19 +27,19 @@ APART = (
     "studies.base.atomic",
     "studies.store",
 )
-"""Own modules that keep account of code, or files, and change no result: a record has a schema number of its own."""
+"""Own modules that track code or files, and change no result: a record has a schema number of its own."""
 ROOT = Path(__file__).parents[1]
 
 
 class Source(NamedTuple):
-    """What a module is, read from its text."""
+    """The content of a module, read from its text."""
 
     meaning: str
     """SHA-256 of its syntax tree without docstrings (hex)."""
     imports: list[tuple[str, str]]
     """(module, name) of each name that is imported; an empty name for the module itself."""
     exports: dict[str, str]
-    """Module of each name that it passes on."""
+    """Module of each name that it exports again."""
 
 
 @cache
@@ -57,16 +57,16 @@ def source_fingerprint(*modules: str, within: tuple[str, ...] = OWN) -> str:
 
 def source_hashes(*modules: str, within: tuple[str, ...] = OWN) -> dict[str, str]:
     """The hash of each module that `source_fingerprint` covers, by dotted name. Raises the same."""
-    known: dict[str, Source] = {}
+    sources: dict[str, Source] = {}
     waiting = list(modules)
     while waiting:
         name = waiting.pop()
-        if name in known:
+        if name in sources:
             continue
-        known[name] = _source(name)
+        sources[name] = _source(name)
         waiting += [other for other in _followed(name) if _counts(other, within)]
-    _remembered().keep()
-    return {name: source.meaning for name, source in known.items()}
+    _memory().keep()
+    return {name: source.meaning for name, source in sources.items()}
 
 
 def own_file(module: str) -> Path | None:
@@ -101,7 +101,7 @@ def _is_within(module: str, within: tuple[str, ...]) -> bool:
 
 @cache
 def _followed(module: str) -> frozenset[str]:
-    """The modules that the names it imports come from; a package that passes a name on is passed over."""
+    """The modules that the names it imports come from; for a name that a package only exports again, its origin."""
     imports = _source(module).imports
     return frozenset(_origin(other, name) for other, name in imports if own_file(other) is not None)
 
@@ -128,50 +128,50 @@ def _source(module: str) -> Source:
     file = own_file(module)
     if file is None:
         raise MassSpringError(f"there is no module {module!r} in {', '.join(OWN)}: its state cannot be known")
-    return _remembered().get(module, file)
+    return _memory().get(module, file)
 
 
 class _Memory:
-    """Syntax trees of files read before, by the hash of their bytes: parsing all takes a second."""
+    """The cache of `Source` entries, by the hash of the bytes of a file: parsing all files takes a second."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
         self.grown = False
-        self.known: dict[str, list] = {}
+        self.entries: dict[str, list] = {}
         with suppress(OSError, ValueError):
             stored = json.loads(path.read_text(encoding="utf-8"))
-            self.known = stored if isinstance(stored, dict) and len(stored) < MOST else {}
+            self.entries = stored if isinstance(stored, dict) and len(stored) < MOST else {}
 
     def get(self, module: str, file: Path) -> Source:
         content, stub = file.read_bytes(), _stub(module)
         public = stub.read_bytes() if stub.is_file() else b""
         key = hashlib.sha256(f"{VERSION} {module} {file.name}\0".encode() + content + public).hexdigest()
-        if key not in self.known:
-            self.known[key] = list(read_source(content, module, file, public))
+        if key not in self.entries:
+            self.entries[key] = list(read_source(content, module, file, public))
             self.grown = True
-        meaning, imports, exports = self.known[key]
+        meaning, imports, exports = self.entries[key]
         return Source(meaning, [(pair[0], pair[1]) for pair in imports], exports)
 
     def keep(self) -> None:
-        """Written whole or not at all; where nothing can be written, everything is read again next time."""
+        """Writes the cache, whole or not at all; where it cannot be, the next process parses all files again."""
         if not self.grown:
             return
         self.grown = False
         with suppress(OSError):
             self.path.parent.mkdir(parents=True, exist_ok=True)
             with tempfile.NamedTemporaryFile("w", dir=self.path.parent, suffix=".part", delete=False) as part:
-                json.dump(self.known, part)
+                json.dump(self.entries, part)
             os.replace(part.name, self.path)
 
 
 VERSION = 2
-"""Of what is remembered."""
+"""Of the entries in the cache."""
 MOST = 20_000
-"""Texts that are remembered; then the cache starts again, since most belong to old versions."""
+"""Entries of the cache; with more it starts empty, since most belong to old versions."""
 
 
 @cache
-def _remembered() -> _Memory:
+def _memory() -> _Memory:
     return _Memory(cache_folder() / "sources.json")
 
 
@@ -213,7 +213,7 @@ def _imports(tree: ast.AST, package: str) -> Iterator[tuple[str, str]]:
 
 
 def _drop_docstrings(tree: ast.AST) -> None:
-    """Takes away the strings that stand by themselves: docstrings, and those below a field or a constant."""
+    """Removes strings that are statements: docstrings, and those below a field or a constant."""
     for node in ast.walk(tree):
         for name in ("body", "orelse", "finalbody"):
             block = getattr(node, name, None)

@@ -26,9 +26,9 @@ from studies.scene.scene_file import python_name
 from studies.tools.verify.second_judge import reference_of
 
 PRESSED_IN, LIFTED = 0.1, 0.15
-"""How far a plane goes in, of the depth along its way, and the free end goes up, of the organ's length."""
+"""Travel of a plane, of the depth along its path, and of the free end, of the length of the organ."""
 GAP = 0.002
-"""Between plane and body at the start, of the depth along its way."""
+"""Between plane and body at the start, of the depth along the path."""
 UNTIL = 0.6 * DURATION
 """When nothing moves any more [s]."""
 LOADS = ("lifted", "pressed", "probed")
@@ -40,15 +40,15 @@ def scan_scenes(path: Path, unit: str = "mm") -> dict[str, Scene]:
     """The three scenes of the organ in a file, by load. Raises StudyError where it cannot be meshed or placed."""
     source, name = Source(path.absolute(), unit), python_name(path.stem)
     mesh = scan(source, NODES, fill=False)
-    found = proposal(mesh)
-    probed = placed_scene(f"{name}_probed", source, found)
-    scenes = lifted(probed, mesh, found), pressed(probed, mesh, found), probed
+    placing = proposal(mesh)
+    probed = placed_scene(f"{name}_probed", source, placing)
+    scenes = lifted(probed, mesh, placing), pressed(probed, mesh, placing), probed
     return {load: replace(one, name=f"{name}_{load}") for load, one in zip(LOADS, scenes, strict=True)}
 
 
-def pressed(probed: Scene, mesh: OrganMesh, found: Proposal) -> Scene:
+def pressed(probed: Scene, mesh: OrganMesh, placing: Proposal) -> Scene:
     """The same organ pressed by a plane that comes as the probe does."""
-    inward = scaled(found.palpation.normal, -1.0)
+    inward = scaled(placing.palpation.normal, -1.0)
     ways = mesh.points[: mesh.outer_count] @ np.asarray(inward)
     depth = float(np.ptp(ways))
     path = Trajectory((0.0, UNTIL), ((0.0, 0.0, 0.0), scaled(inward, (PRESSED_IN + GAP) * depth)))
@@ -58,16 +58,16 @@ def pressed(probed: Scene, mesh: OrganMesh, found: Proposal) -> Scene:
     return replace(probed, title=title, obstacles=(plane,), reference=plan, probed=ForceOutput("obstacle", 0, inward))
 
 
-def lifted(probed: Scene, mesh: OrganMesh, found: Proposal) -> Scene:
+def lifted(probed: Scene, mesh: OrganMesh, placing: Proposal) -> Scene:
     """The same organ without a probe, its free end grasped as much as the other is held, and lifted across its length,
     along its shortest axis."""
     centres, areas = mesh.points[mesh.outer_triangles].mean(axis=1), triangle_areas(mesh.points, mesh.outer_triangles)
-    assert isinstance(found.hold, HalfSpace)  # by rule, not at a point
-    away = np.asarray(found.hold.normal)
+    assert isinstance(placing.hold, HalfSpace)  # by rule, not at a point
+    away = np.asarray(placing.hold.normal)
     order = np.argsort(-(centres @ away))
     last = centres[order[int(np.searchsorted(np.cumsum(areas[order]) / areas.sum(), HELD))]]
-    up = found.axes[2]
-    path = Trajectory((0.0, UNTIL), ((0.0, 0.0, 0.0), scaled(up, LIFTED * found.sides[0])))
+    up = placing.axes[2]
+    path = Trajectory((0.0, UNTIL), ((0.0, 0.0, 0.0), scaled(up, LIFTED * placing.sides[0])))
     grasp = Held("grasp", HalfSpace(vector(last), vector(-away)), path)
     title, held = f"{mesh.name}: held at one end, lifted at the other", (*probed.held, grasp)
     plan = replace(PLAN, at_contact=0)
@@ -75,7 +75,7 @@ def lifted(probed: Scene, mesh: OrganMesh, found: Proposal) -> Scene:
 
 
 def row(scene: Scene, reference: Reference) -> str:
-    """What a reference says: force on each mesh [N], unknowns, seconds, and how far its finest is to be trusted [%]."""
+    """A reference as a row: its uncertainty [%], force on each mesh [N], unknowns and seconds."""
     family = reference.meshes[::-1]
     forces = " / ".join(f"{one.force[-1]:.4g}" for one in family)
     unknowns = " / ".join(f"{one.unknowns:,}" for one in family)

@@ -87,12 +87,12 @@ def can_be_graded(scene: Scene) -> bool:
 def quadratic_cases(scene: Scene) -> tuple[Case, ...]:
     """Even and graded bodies in all sizes at the long step, each on five neighbouring meshes. The headline is recorded,
     and the middle one of each five is timed."""
-    best, found = headline_case(scene), list[Case]()
+    best, cases = headline_case(scene), list[Case]()
     for body in (*even(scene), *graded(scene)):
         for mesh in neighbours(body):
             case = _timed(scene, mesh, LONG) if mesh == body else replace(_timed(scene, mesh, LONG), timed=False)
-            found.append(best if mesh == best.body else case)
-    return tuple(found)
+            cases.append(best if mesh == best.body else case)
+    return tuple(cases)
 
 
 def element_cases(scene: Scene) -> tuple[Case, ...]:

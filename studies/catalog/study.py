@@ -113,7 +113,7 @@ class Study:
             if odd:
                 raise StudyError(f"{what} holds {odd[0]!r}, which is not a {kind.__name__}")
         for status in self.expects:
-            lookup(status, [str(known) for known in Status], "status that a study expects")
+            lookup(status, [str(each) for each in Status], "status that a study expects")
 
     def smoke(self) -> "Study":
         """The same study on small meshes, few frames and the two coarsest reference meshes: does it work at all?"""

@@ -20,9 +20,9 @@ from studies.cli.terminal import errors, say
 app = typer.Typer(cls=Commands, no_args_is_help=True, pretty_exceptions_enable=False)
 
 
-def show_version(asked: bool) -> None:
+def show_version(flag: bool) -> None:
     """Prints the version and ends."""
-    if asked:
+    if flag:
         say(f"organbench {studies.__version__}")
         raise typer.Exit
 

@@ -1,4 +1,4 @@
-"""Mesh files on the command line: how their numbers are to be taken, and what is asked before they are read."""
+"""Mesh files on the command line: their unit and scale, and questions before they are read."""
 
 import logging
 import sys
@@ -36,7 +36,7 @@ def source_of(path: Path, unit: str | None, scale: float, longest_side: str | No
 def settled(source: Source, yes: bool) -> Source:
     """The file once it may be read and its unit is known: asks at the terminal, or raises StudyError."""
     ask_before_large(source.path, yes)
-    return asked_unit(source)
+    return with_unit(source)
 
 
 def ask_before_large(path: Path, yes: bool) -> None:
@@ -52,8 +52,8 @@ def ask_before_large(path: Path, yes: bool) -> None:
         raise StudyError(f"{sentence}; say --yes to go on, or reduce it in the program that made it")
 
 
-def asked_unit(source: Source) -> Source:
-    """With the unit asked for at the terminal, where one is needed and there is a terminal."""
+def with_unit(source: Source) -> Source:
+    """With the unit that the user types, where one is needed and there is a terminal."""
     path = source.path
     if source.unit or source.longest_side or not sys.stdin.isatty() or not path.is_file():
         return source
@@ -69,7 +69,7 @@ def asked_unit(source: Source) -> Source:
 
 
 class Telling(logging.Handler):
-    """Shows what the mesher is at: next to the moving line of a terminal, elsewhere as a line now and then."""
+    """Shows the stage of the mesher: next to the moving line of a terminal, elsewhere as a line now and then."""
 
     def __init__(self, what: str, status: Status | None):
         """what: the work as a whole; status: the terminal's moving line."""
@@ -87,7 +87,7 @@ class Telling(logging.Handler):
 
 @contextmanager
 def working(what: str) -> Iterator[None]:
-    """Tells what is going on while something takes long: a line that moves, or lines where there is no terminal."""
+    """Shows the stage of a long task: a line that moves, or lines where there is no terminal."""
     with busy(escape(what)) as status:
         handler, level = Telling(what, status), WAITING.level
         WAITING.addHandler(handler)

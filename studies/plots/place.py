@@ -1,4 +1,4 @@
-"""Where an organ of one's own is held and palpated: seen by the probe, and from its side."""
+"""Where an organ of the user is held and palpated: seen by the probe, and from the side."""
 
 from pathlib import Path
 
@@ -19,32 +19,32 @@ BAR = 0.02
 """Length of the scale bar [m]."""
 
 
-def draw_placing(mesh: OrganMesh, found: Proposal, radius: float, path: Path) -> None:
+def draw_placing(mesh: OrganMesh, placing: Proposal, radius: float, path: Path) -> None:
     """Draws a proposal into a PNG file; radius: of the probe [m]."""
-    save(figure(mesh, found, radius), path)
+    save(figure(mesh, placing, radius), path)
 
 
 @styled
-def figure(mesh: OrganMesh, found: Proposal, radius: float) -> Figure:
+def figure(mesh: OrganMesh, placing: Proposal, radius: float) -> Figure:
     """Two views: as the probe sees the body, and turned by a right angle."""
-    x, y, z = found.palpation.normal
+    x, y, z = placing.palpation.normal
     facing = Camera(float(np.degrees(np.arctan2(y, x))), float(np.degrees(np.arcsin(np.clip(z, -1.0, 1.0)))))
     sheet = page(7.0, 4.2)
     views = (("as the probe sees it", facing), ("from the side", Camera(facing.azimuth + 90.0, 0.0)))
     for axes, (title, camera) in zip(panels(sheet, 1, 2)[0], views, strict=True):
-        draw(axes, mesh, found, radius, camera)
+        draw(axes, mesh, placing, radius, camera)
         axes.set_title(title)
     handles = [Patch(color=BLUE, label="held"), Patch(color=ORANGE, label="probe")]
     return finish(sheet, f"{mesh.name}: proposed by its shape", handles, columns=2)
 
 
-def draw(axes: Axes, mesh: OrganMesh, found: Proposal, radius: float, camera: Camera) -> None:
+def draw(axes: Axes, mesh: OrganMesh, placing: Proposal, radius: float, camera: Camera) -> None:
     """The outer surface with its held end, and the probe before it presses."""
     points, triangles = mesh.points[: mesh.outer_count], mesh.outer_triangles
     colours = uniform(TISSUE, len(triangles))
-    colours[(found.hold.level(points)[triangles] <= 0).all(axis=1)] = to_rgb(BLUE)
+    colours[(placing.hold.level(points)[triangles] <= 0).all(axis=1)] = to_rgb(BLUE)
     draw_surface(axes, points, triangles, colours, camera)
-    centre = np.asarray(found.palpation.point) + radius * np.asarray(found.palpation.normal)
+    centre = np.asarray(placing.palpation.point) + radius * np.asarray(placing.palpation.normal)
     right, up, _ = camera.see(centre)
     axes.add_patch(Circle((right, up), radius, facecolor=ORANGE, edgecolor="black", alpha=0.6))
     seen = np.vstack([camera.see(points)[:, :2], [[right - radius, up - radius], [right + radius, up + radius]]])

@@ -1,4 +1,4 @@
-"""How far each quantity of each reference may be from the truth, and what that comes from."""
+"""The uncertainty of each quantity of each reference, and its shares."""
 
 from collections.abc import Mapping, Sequence
 
@@ -22,31 +22,31 @@ WORDS = {
     "steps": "load steps (halved)",
 }
 LOWEST = 1e-4
-"""Where a smaller share is drawn [%]: smaller ones do not matter."""
+"""Where smaller shares are drawn [%]: they do not matter."""
 PERCENT = 100.0
 
 
 @styled
-def figure(known: Mapping[str, Mapping[str, Uncertainty]]) -> Figure:
+def figure(uncertainties: Mapping[str, Mapping[str, Uncertainty]]) -> Figure:
     """One panel per scene, a row per quantity: its shares, and a bar up to their sum.
 
     Panels share their rows: one that its scene does not allow stays empty.
     """
-    if not known:
+    if not uncertainties:
         return blank(TITLE, "no reference has been solved on its family of meshes yet")
-    sheet, axes = panel_grid(len(known), 2, (5.2, 2.9), (0.0, 0.3), sharex=True, sharey=True)
-    longest_first = sorted(known.values(), key=len, reverse=True)
+    sheet, axes = panel_grid(len(uncertainties), 2, (5.2, 2.9), (0.0, 0.3), sharex=True, sharey=True)
+    longest_first = sorted(uncertainties.values(), key=len, reverse=True)
     names = list(dict.fromkeys(name for quantities in longest_first for name in quantities))
-    for panel, (scene, quantities) in zip(axes.flat, known.items(), strict=False):
+    for panel, (scene, quantities) in zip(axes.flat, uncertainties.items(), strict=False):
         panel.set_title(heading(scene))
         _draw(panel, names, quantities)
-    top = max(PERCENT * u.total for quantities in known.values() for u in quantities.values())
+    top = max(PERCENT * u.total for quantities in uncertainties.values() for u in quantities.values())
     log_axis(axes[0, 0].xaxis)
     axes[0, 0].set_xlim(0.5 * LOWEST, 3 * max(top, LOWEST))
     axes[0, 0].invert_yaxis()
     for panel in axes[-1]:
         panel.set_xlabel("relative uncertainty [%]")
-    return finish(sheet, TITLE, _handles(), _notes(known), columns=3)
+    return finish(sheet, TITLE, _handles(), _notes(uncertainties), columns=3)
 
 
 def _draw(axes: Axes, names: Sequence[str], quantities: Mapping[str, Uncertainty]) -> None:
@@ -76,8 +76,8 @@ def _handles() -> list:
     return [*shares, Line2D([], [], label="mesh, no order observed", **hollow), bar]
 
 
-def _notes(known: Mapping[str, Mapping[str, Uncertainty]]) -> list[str]:
-    orders = [u.order for quantities in known.values() for u in quantities.values() if u.order == u.order]
+def _notes(uncertainties: Mapping[str, Mapping[str, Uncertainty]]) -> list[str]:
+    orders = [u.order for quantities in uncertainties.values() for u in quantities.values() if u.order == u.order]
     seen = f" Observed orders {np.min(orders):.2g} to {np.max(orders):.2g}." if orders else ""
     return [
         "Bar: root of the sum of the squares of the shares; the other charts show it as the uncertainty. Settings are "

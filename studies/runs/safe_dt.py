@@ -25,7 +25,7 @@ class SafeStep:
     limit: StepLimit
     auto: float
     """The step that dt = "auto" takes [s]."""
-    tried: tuple[tuple[float, Status], ...]
+    trials: tuple[tuple[float, Status], ...]
     """(time step [s], how the run ended), ascending."""
     conditionally_stable: bool = True
     """False for a method whose steps have no limit of stability; `limit` is then that of explicit methods."""
@@ -37,8 +37,8 @@ class SafeStep:
 
     @property
     def bracket(self) -> tuple[float, float] | None:
-        """The longest step that held and the next, which diverged [s]; None where no run of either kind was found."""
-        for (below, calm), (above, wild) in zip(self.tried, self.tried[1:], strict=False):
+        """The longest step that held and the next, which diverged [s]; None without such a pair."""
+        for (below, calm), (above, wild) in zip(self.trials, self.trials[1:], strict=False):
             if calm != Status.DIVERGED and wild == Status.DIVERGED:
                 return below, above
         return None
@@ -50,13 +50,13 @@ class SafeStep:
         Where there is none, whether no run diverged.
         """
         if not self.conditionally_stable:
-            return all(status != Status.DIVERGED for _, status in self.tried)
-        found = self.bracket
-        return found is not None and found[0] < self.limit.damped < found[1]
+            return all(status != Status.DIVERGED for _, status in self.trials)
+        bracket = self.bracket
+        return bracket is not None and bracket[0] < self.limit.damped < bracket[1]
 
     @property
     def verdict(self) -> str:
-        """What the runs say of the prediction, in a sentence."""
+        """A sentence on whether the runs confirm the prediction."""
         if not self.conditionally_stable:
             held = "verified" if self.verified else "not verified"
             return f"no stability limit, {held}; accuracy alone limits the step: try half of it and compare"
@@ -78,17 +78,17 @@ def safe_step(case: Case) -> SafeStep:
     prepared = prepare(case)
     limit, auto = prepared.limit, prepared.setup.clock.dt
     if not case.method.capabilities.conditionally_stable:
-        longer = [_tried(case, factor * limit.damped) for factor in FAR_BEYOND]
+        longer = [_trial(case, factor * limit.damped) for factor in FAR_BEYOND]
         return SafeStep(limit, auto, tuple(longer), conditionally_stable=False)
-    tried = [_tried(case, fraction * limit.damped) for fraction in (BELOW, ABOVE)]
-    while len(tried) < MOST_RUNS and tried[0][1] == Status.DIVERGED:
-        tried.insert(0, _tried(case, tried[0][0] / WIDER))
-    while len(tried) < MOST_RUNS and tried[-1][1] != Status.DIVERGED:
-        tried.append(_tried(case, tried[-1][0] * WIDER))
-    return SafeStep(limit, auto, tuple(tried))
+    trials = [_trial(case, fraction * limit.damped) for fraction in (BELOW, ABOVE)]
+    while len(trials) < MOST_RUNS and trials[0][1] == Status.DIVERGED:
+        trials.insert(0, _trial(case, trials[0][0] / WIDER))
+    while len(trials) < MOST_RUNS and trials[-1][1] != Status.DIVERGED:
+        trials.append(_trial(case, trials[-1][0] * WIDER))
+    return SafeStep(limit, auto, tuple(trials))
 
 
-def _tried(case: Case, dt: float) -> tuple[float, Status]:
+def _trial(case: Case, dt: float) -> tuple[float, Status]:
     frames = max(1, int(case.scene.duration / (STEPS_PER_FRAME * dt)))
     record = measure(case.replaced(dt=dt, frames=frames, beyond_limit=True))
     return float(record.attributes.get("dt", dt)), record.status

@@ -1,4 +1,4 @@
-"""Unpacked archives: results folders that are kept as they were, whatever machine and code looks at them."""
+"""Unpacked archives: results folders that stay as they are, whatever machine and code reads them."""
 
 import json
 from pathlib import Path
@@ -22,15 +22,15 @@ def shown_machine(root: Path) -> str:
     if not is_archive(root):
         return machine_id()
     try:
-        found = machine_of(root)
+        machine = machine_of(root)
     except (OSError, json.JSONDecodeError, AttributeError) as error:
         raise StudyError(f"{root / 'machine.json'} is damaged ({error}): unpack the archive again") from error
-    if found is None:
+    if machine is None:
         raise StudyError(f"{root / 'machine.json'} is missing or names no machine: unpack the archive again")
-    return found
+    return machine
 
 
 def check_no_archive(root: Path) -> None:
-    """Raises StudyError for an archive: nothing is run in there."""
+    """Raises StudyError for an archive, in which nothing runs."""
     if is_archive(root):
         raise StudyError(f"{root} is an unpacked archive, which stays as it is; run into another folder with --results")

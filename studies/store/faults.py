@@ -9,7 +9,7 @@ from studies.store.schema import INDEX, LAYOUTS, NUMBER, TEXT, WITHOUT_FIELDS, A
 
 DTYPES = {NUMBER: "fiu", INDEX: "iu", TEXT: "U"}
 TYPES = {NUMBER: (int, float), INDEX: (int,), TEXT: (str,)}
-"""What fields of a kind are to numpy, and attributes to Python."""
+"""The numpy kinds of fields, and the Python types of attributes."""
 
 
 def fault(kind: str, status: Status, attributes: Mapping[str, Any], fields: Mapping[str, Any]) -> str | None:
@@ -46,7 +46,7 @@ def _attribute_fault(name: str, spec: AttributeSpec, attributes: Mapping[str, An
 
 
 def _field_fault(name: str, spec: FieldSpec, fields: Mapping[str, Any], lengths: dict[str, int]) -> str | None:
-    """Lengths that a letter stands for here for the first time are added to `lengths`."""
+    """The first use of a letter adds its length to `lengths`."""
     if name not in fields:
         return None if spec.optional else f"lacks {name!r}"
     values = np.asarray(fields[name].values)
@@ -56,14 +56,14 @@ def _field_fault(name: str, spec: FieldSpec, fields: Mapping[str, Any], lengths:
         return f"holds {name!r} in {fields[name].unit!r}, not in {spec.unit!r}"
     letters = spec.shape.split()
     if values.ndim == len(letters):
-        wanted = [
+        shape = [
             int(x) if x.isdigit() else lengths.setdefault(x, n) for x, n in zip(letters, values.shape, strict=True)
         ]
-        if tuple(wanted) == values.shape:
+        if tuple(shape) == values.shape:
             return None
     else:
-        wanted = [lengths.get(x, x) for x in letters]
-    return f"holds {name!r} with shape ({_row(values.shape)}), not ({_row(wanted)})"
+        shape = [lengths.get(x, x) for x in letters]
+    return f"holds {name!r} with shape ({_row(values.shape)}), not ({_row(shape)})"
 
 
 def _row(lengths: Any) -> str:

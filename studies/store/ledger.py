@@ -1,8 +1,8 @@
-"""What a results folder holds, a line per file: the one place that says whether a result is there and current.
+"""The content of a results folder, a line per file: the one place that says whether a result is there and current.
 
 The lines lie in results/cache/ledger.sqlite. They are a copy of the heads of the files: a line is read again when the
 size, a time or the inode of its file differs, and the whole ledger may be deleted at any time. A ledger that is damaged
-or of another layout is made again; where none can be written, the lines are kept in memory.
+or of another layout is replaced; where none can be written, the lines are kept in memory.
 """
 
 import json
@@ -30,7 +30,7 @@ TABLES = (
 LAYOUT = zlib.crc32(f"{SCHEMA} {TABLES}".encode()) >> 1
 """Number of the layout: another one for other columns or records."""
 PATIENCE = 20.0
-"""Seconds that another command may hold the ledger; it writes for some hundredths."""
+"""Seconds to wait for another command that holds the ledger; a write takes some hundredths."""
 BATCH = 500
 """Files after which the lines read so far are stored, so that an interrupted command need not begin again."""
 MANY = 100
@@ -44,10 +44,10 @@ TIMED = (Status.OK, Status.INVERTED, Status.DRIFTED)
 
 
 class Result(Protocol):
-    """What the ledger must know of a job to find its result."""
+    """The properties of a job by which the ledger finds its result."""
 
     def path(self) -> Path:
-        """Where its record lies."""
+        """The path of its record."""
         ...
 
     @property
@@ -62,7 +62,7 @@ class Result(Protocol):
 
 
 class Ledger:
-    """The stored results below `root`, as they are when each folder is first asked for, or after `look_again`.
+    """The stored results below `root`, as they are at the first use of each folder, or the first after `look_again`.
 
     A command opens one and passes it on.
     """
@@ -84,7 +84,7 @@ class Ledger:
         return self._folders[study]
 
     def look_again(self) -> None:
-        """Files may have changed since: each folder is looked at again when it is next asked for."""
+        """Files may have changed: the next use of each folder scans it again."""
         self._folders.clear()
 
     def entry(self, job: Result) -> Entry | None:
@@ -118,28 +118,28 @@ class Ledger:
         return current or not self.can_be_timed(job)
 
     def measured(
-        self, study: str, what: str, wanted: Mapping[str, str], measure: Callable[[str], Any]
+        self, study: str, what: str, dependencies: Mapping[str, str], measure: Callable[[str], Any]
     ) -> dict[str, Any]:
-        """What `measure` returns for the name of each file in `wanted`, JSON-able; kept until the file changes, or its
-        text in `wanted`, which names all else that the value depends on. None stands for no value, and is not kept.
+        """What `measure` returns for the name of each file in `dependencies`, JSON-able; kept until the file changes,
+        or its text there, which names all else that the value depends on. None stands for no value, and is not kept.
 
-        what: names the set of values.
+        what: name of the set of values.
         """
         query = "SELECT file, state, value FROM measured WHERE study = ? AND what = ?"
         kept = {(file, state): value for file, state, value in self._query(query, (study, what))}
-        files, found, fresh = self.files(study), dict[str, Any](), list[tuple]()
-        for file, depends in wanted.items():
-            state = f"{files[file].state} {depends}"
+        files, values, fresh = self.files(study), dict[str, Any](), list[tuple]()
+        for file, dependency in dependencies.items():
+            state = f"{files[file].state} {dependency}"
             if (file, state) in kept:
-                found[file] = json.loads(kept[file, state])
+                values[file] = json.loads(kept[file, state])
             elif (value := measure(file)) is not None:
-                found[file] = value
+                values[file] = value
                 fresh.append((study, what, file, state, json.dumps(value)))
         if fresh:
             last = "SELECT what FROM measured WHERE study = ? GROUP BY what ORDER BY max(rowid) DESC LIMIT ?"
             self._write("INSERT OR REPLACE INTO measured VALUES (?, ?, ?, ?, ?)", fresh)
             self._write(f"DELETE FROM measured WHERE study = ? AND what NOT IN ({last})", [(study, study, SETS)])
-        return found
+        return values
 
     def state(self, jobs: Iterable[Result]) -> str:
         """The files of jobs with sizes and times, as text: a copy of the folder has the same."""
@@ -147,31 +147,31 @@ class Ledger:
         return "\n".join(entry.written if entry else f"{job.path().name} -" for job, entry in entries)
 
     def forget(self, study: str, names: Iterable[str]) -> None:
-        """Reads these files again: they turned out to be damaged."""
+        """Drops these files, which are damaged: the next use of the folder reads them again."""
         self._write("DELETE FROM files WHERE study = ? AND file = ?", [(study, name) for name in names])
         self._folders.pop(study, None)
 
     def _scanned(self, study: str) -> dict[str, Entry]:
         folder, there = study_folder(self.root, study), dict(self._listed(study))
         query = f"SELECT {', '.join(Entry._fields)} FROM files WHERE study = ?"
-        known = {entry.file: entry for entry in map(Entry._make, self._query(query, (study,)))}
-        gone = [(study, name) for name in known if name not in there]
+        stored = {entry.file: entry for entry in map(Entry._make, self._query(query, (study,)))}
+        gone = [(study, name) for name in stored if name not in there]
         for table in ("files", "measured"):
             self._write(f"DELETE FROM {table} WHERE study = ? AND file = ?", gone)
-        found = {} if self.check else {n: e for n, e in known.items() if there.get(n) == e.state}
-        changed = [name for name in there if name not in found]
+        entries = {} if self.check else {n: e for n, e in stored.items() if there.get(n) == e.state}
+        changed = [name for name in there if name not in entries]
         for start in range(0, len(changed), BATCH):
             fresh = [read_entry(folder / name) for name in changed[start : start + BATCH]]
             marks = ", ".join("?" * (1 + len(Entry._fields)))
             self._write(f"INSERT OR REPLACE INTO files VALUES ({marks})", [(study, *entry) for entry in fresh])
-            found |= {entry.file: entry for entry in fresh}
+            entries |= {entry.file: entry for entry in fresh}
         if self.problem and len(changed) > MANY:
             warnings.warn(
                 f"{self.path} cannot be written ({self.problem}): every command reads all {len(changed)} files of "
                 f"{folder} again",
                 stacklevel=3,
             )
-        return dict(sorted(found.items()))
+        return dict(sorted(entries.items()))
 
     def _listed(self, study: str) -> Iterator[tuple[str, tuple[int, ...]]]:
         """Names and states of the results files of a study; none where there is no folder."""

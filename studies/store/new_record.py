@@ -25,8 +25,8 @@ class Header(TypedDict):
 
 def new_record(*, attributes: Mapping[str, Any], fields: Mapping[str, Field], **header: Unpack[Header]) -> Record:
     """A record with the current schema and this machine's id filled in, and whether it was computed portably."""
-    known = {**attributes, **portable.attributes()}
-    return Record(schema=SCHEMA, machine=machine_id(), attributes=known, fields=dict(fields), **header)
+    attributes = {**attributes, **portable.attributes()}
+    return Record(schema=SCHEMA, machine=machine_id(), attributes=attributes, fields=dict(fields), **header)
 
 
 def new_fields(specs: Mapping[str, FieldSpec], values: Mapping[str, np.ndarray]) -> dict[str, Field]:

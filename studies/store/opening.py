@@ -1,6 +1,6 @@
-"""The seal of a results file, and opening one: whatever is wrong with it is one sentence.
+"""The seal of a results file, and opening one: every fault is one sentence.
 
-The seal is looked at before the HDF5 library sees the file: single bits send the library into an endless loop.
+The seal is checked before the HDF5 library sees the file: single bits send the library into an endless loop.
 """
 
 import hashlib
@@ -52,8 +52,8 @@ def check_seal(path: Path) -> None:
             f"{path} is an HDF5 file of another program, or of an earlier version of organbench, which stored no "
             "checksums: run its case again, or read it with the version that wrote it"
         )
-    known = former or head.startswith(SIGNATURE)
-    what = "is cut off or damaged" if known else "is not an HDF5 file, or was cut off"
+    is_hdf5 = former or head.startswith(SIGNATURE)
+    what = "is cut off or damaged" if is_hdf5 else "is not an HDF5 file, or was cut off"
     raise DamagedFile(f"{path} {what} ({size} bytes): {AGAIN}")
 
 

@@ -107,8 +107,8 @@ def _name_dimensions(file: h5py.File, kind: str, datasets: Mapping[str, h5py.Dat
 
 
 def read_record(path: Path, fields: Iterable[str] | None = None) -> Record:
-    """The record in `path`, with all fields or only the named ones; with all of them, held to its table
-    (studies.store.schema). The file is opened read-only.
+    """The record in `path`, with all fields or only the named ones; with all of them, checked against its
+    table (studies.store.schema). The file is opened read-only.
 
     Raises StudyError when the file is missing, of another program or lacks a named field, DamagedFile when its content
     is not what was written, OtherVersion for another schema.
@@ -131,7 +131,7 @@ def peek(path: Path) -> Record:
 
 
 def glance(path: Path, attributes: Collection[str]) -> Record:
-    """As `peek`, with those of the named attributes that are there alone: a third of the time for a small file."""
+    """As `peek`, with only the named attributes, where they exist: a third of the time for a small file."""
     with open_results(path) as file:
         return _header(path, file, (*HEADER, *attributes))
 
@@ -186,9 +186,9 @@ def _is_short_list(value: Any) -> bool:
     return array.dtype.kind in "biuf" and array.nbytes <= 4096
 
 
-def _header(path: Path, file: h5py.File, wanted: Collection[str] | None = None) -> Record:
-    """The record without fields. wanted: the attributes that are read; without, all."""
-    attributes = file.attrs  # a new one each time it is asked for, and each opens the file's root
+def _header(path: Path, file: h5py.File, selection: Collection[str] | None = None) -> Record:
+    """The record without fields. selection: names of the attributes to read; None: all."""
+    attributes = file.attrs  # every access makes a new object, which opens the file's root
     if "schema" not in attributes:
         raise StudyError(f"{path} is an HDF5 file, but not a results file of organbench: it has no schema version")
     schema = _plain(attributes["schema"])
@@ -199,7 +199,7 @@ def _header(path: Path, file: h5py.File, wanted: Collection[str] | None = None) 
         )
     if _plain(attributes.get("kind")) == INDEX_KIND:
         raise StudyError(f"{path} is the index of a study, not a case: give one of the files next to it")
-    names = [name for name in wanted or attributes if name in attributes and name != PART_DIGESTS]
+    names = [name for name in selection or attributes if name in attributes and name != PART_DIGESTS]
     values = {name: _plain(attributes[name]) for name in names}
     header = {name: values.pop(name) for name in HEADER}
     header["status"] = Status(lookup(header["status"], [str(status) for status in Status], f"status in {path}"))

@@ -34,7 +34,7 @@ def find_study(name: str) -> Study:
     if ON in name:
         return _on_folder(*name.split(ON, 1))
     if not name.endswith(SUFFIX):
-        return known_studies([name])[0]
+        return catalogue_studies([name])[0]
     study = replace(read_user_file(name).as_study, word=name)
     file = Path(name).name
     if not study.cases:
@@ -54,14 +54,14 @@ def _on_folder(name: str, given: str) -> Study:
     folder, _, unit = given.partition(":") if not Path(given).is_dir() else (given, "", "")
     study, placed = study_on(find_study(name), Path(folder), unit or None)
     for one in placed:
-        said = "; ".join(one.words)
-        if said:
-            warnings.warn(said if one.scene else f"{one.path.name} is refused: {said}", stacklevel=2)
+        sentence = "; ".join(one.words)
+        if sentence:
+            warnings.warn(sentence if one.scene else f"{one.path.name} is refused: {sentence}", stacklevel=2)
     return replace(study, word=f"{name}{ON}{given}")
 
 
-def known_studies(names: Sequence[str]) -> list[Study]:
-    """Studies of the catalogue by name, and that of the population, which is drawn when it is asked for.
+def catalogue_studies(names: Sequence[str]) -> list[Study]:
+    """Studies of the catalogue by name, and that of the population, which is drawn only when it is named.
 
     Raises StudyError with the nearest name.
     """
@@ -98,7 +98,7 @@ def _check_stored(name: str, case: Case) -> None:
 
 
 def _check_settings(which: str, case: Case) -> None:
-    """Raises StudyError for settings of a body or a cut of which storing says nothing, or nothing clear."""
+    """Raises StudyError for settings of a body or a cut for which storing gives no error, or no clear one."""
     if not isinstance(case.scene.cuts, tuple):
         raise StudyError(f"{which}: scene.cuts is no tuple; write (Cut(...),)")
     for cut in case.scene.cuts:

@@ -20,13 +20,13 @@ from studies.sweep.frame_times import measure_times
 from studies.sweep.job import CaseJob, Job, do
 
 COMPILED = "NUMBA_CACHE_DIR"
-"""Where the user may want compiled code."""
+"""Variable with the user's folder for compiled code."""
 ONE_THREAD = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS")
 """Every process computes on one core: the cores are shared out by cases, not inside them."""
 
 
 def begin(files: tuple[Given, ...], tell: Tell) -> None:
-    """What every process does first: it loads the user's `files`, and tells what it compiles."""
+    """What every process does first: it loads the user's `files`, and reports what it compiles."""
     load_given(files)
     event.register(EVENT, CompileWatch(tell))
 
@@ -39,10 +39,10 @@ def files_for(jobs: Sequence[Job]) -> tuple[Given, ...]:
 def environment(portable: bool = False) -> dict[str, str]:
     """Variables of processes that do jobs: one thread, the caches of this process wherever they work; portable: the
     settings of studies.base.portable."""
-    wanted = {**dict.fromkeys(ONE_THREAD, "1"), "ORGANBENCH_CACHE": str(cache_folder().absolute())}
+    variables = {**dict.fromkeys(ONE_THREAD, "1"), "ORGANBENCH_CACHE": str(cache_folder().absolute())}
     if os.environ.get(COMPILED):
-        wanted[COMPILED] = str(Path(os.environ[COMPILED]).absolute())
-    return wanted | (portable_environment() if portable else {})
+        variables[COMPILED] = str(Path(os.environ[COMPILED]).absolute())
+    return variables | (portable_environment() if portable else {})
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""What a sweep would run, why, how long that may take, from the seconds that stored results carry, and its size."""
+"""The jobs that a sweep would run: why, how long by the seconds of stored results, and how large."""
 
 import shutil
 from collections.abc import Callable, Mapping, Sequence
@@ -41,15 +41,15 @@ class Planned:
     """Whether that rate is one of this machine."""
 
 
-def plan(ledger: Ledger, study: Study, wanted: Callable[[Job], bool] | None = None) -> list[Planned]:
-    """What `run_studies` would run of a study, in its order; `wanted` as there."""
+def plan(ledger: Ledger, study: Study, selection: Callable[[Job], bool] | None = None) -> list[Planned]:
+    """What `run_studies` would run of a study, in its order; `selection` as there."""
     jobs = jobs_of(ledger.root, [study])
-    chosen = [job for job in jobs if (ledger.why(job) is not None if wanted is None else wanted(job))]
+    chosen = [job for job in jobs if (ledger.why(job) is not None if selection is None else selection(job))]
     measured = rates(ledger, jobs) if chosen else {}
     pieces = [_of_job(ledger, job, measured) for job in chosen]
     runs = {job.label for job in chosen}
     for job in case_jobs(ledger.root, study):
-        if not job.work.timed or (wanted is not None and job.label not in runs):
+        if not job.work.timed or (selection is not None and job.label not in runs):
             continue
         why = ledger.why_untimed(job)
         if why is not None and (ledger.can_be_timed(job) or job.label in runs):
@@ -109,8 +109,8 @@ def expected(pieces: Sequence[Planned], jobs: int) -> float:
 
 
 def expected_bytes(pieces: Sequence[Planned]) -> tuple[int, int]:
-    """What `pieces` will store, and how many of them are not in that, because nothing is known of their size. A
-    reference counts as the mean of those that are known."""
+    """What `pieces` will store, and how many of them are not counted, because their size is unknown. A reference
+    counts as the mean of those of known size."""
     sizes = [piece.size for piece in pieces if piece.size is not None]
     references = [piece.size for piece in pieces if piece.kind == "reference" and piece.size is not None]
     unknown = len(pieces) - len(sizes)

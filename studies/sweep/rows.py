@@ -22,14 +22,15 @@ def table_rows(references: References, study: Study, metrics: Sequence[Metric]) 
     ledger, problems = references.ledger, reference_problems(references, study)
     code = source_fingerprint("studies.metrics.table", "studies.sweep.load")
     scenes = {scene.name: ledger.state(reference_jobs(ledger.root, [scene])) for scene in study.scenes}
-    jobs, wanted, machine = dict[str, CaseJob](), dict[str, str](), shown_machine(ledger.root)
+    jobs, dependencies, machine = dict[str, CaseJob](), dict[str, str](), shown_machine(ledger.root)
     for job in case_jobs(ledger.root, study):
         entry, timing = ledger.entry(job), ledger.timing(job, machine) if job.work.timed else None
         problems += [] if entry else [not_stored(ledger.root, job)]
         problems += [one.error() for one in (entry, timing) if one and one.fault]
         if entry and not entry.fault:
             jobs[entry.file] = job
-            wanted[entry.file] = f"{timing and timing.state} {job.fingerprint} {code} {scenes[job.work.scene.name]}"
+            texts = timing and timing.state, job.fingerprint, code, scenes[job.work.scene.name]
+            dependencies[entry.file] = " ".join(map(str, texts))
 
     def measure(file: str) -> Row | None:
         run, damaged = load_run(references, jobs[file])
@@ -38,7 +39,7 @@ def table_rows(references: References, study: Study, metrics: Sequence[Metric]) 
             problems.extend(damaged)
         return row_of(run, metrics) if run else None
 
-    rows = ledger.measured(study.name, f"row {_hash(metrics)}", wanted, measure)
+    rows = ledger.measured(study.name, f"row {_hash(metrics)}", dependencies, measure)
     return list(rows.values()), sentences(problems)
 
 

@@ -19,14 +19,14 @@ def run_studies(
     studies: list[Study],
     jobs: int | Executor,
     progress: Progress,
-    wanted: Callable[[Job], bool] | None = None,
+    selection: Callable[[Job], bool] | None = None,
     on_compile: CompileListener = lambda name: None,
     failures: Failures | None = None,
     ledger: Ledger | None = None,
 ) -> int:
     """Brings the studies up to date below `root`; the number of pieces that had to run.
 
-    `jobs`: so many processes of this machine, or an executor. `wanted` replaces the rule "what is not current".
+    `jobs`: so many processes of this machine, or an executor. `selection` replaces the rule "what is not current".
     `on_compile` hears what is being compiled, from any thread. `failures` hears of jobs whose process died, which are
     stored as failed, and of those that do not run because a folder lies in the place of their file. `ledger`: of
     `root`, where the command has one. Another command may work on the same folder. Raises StudyError when results
@@ -40,7 +40,7 @@ def run_studies(
         entry = ledger.entry(job)
         return ledger.why(job) is not None or (executor.portable and (entry is None or entry.portable is None))
 
-    rule = wanted or stale
+    rule = selection or stale
     ledger.look_again()
     stored = [(job, ledger.entry(job)) for job in jobs_of(root, studies) if rule(job)]
     todo = [replace(job, initial_state=entry and entry.state) for job, entry in stored]
@@ -49,7 +49,7 @@ def run_studies(
         check_writable(root)
         storable = [job for job in todo if failures.can_store(job)]
         perform(executor, storable, progress, on_compile, failures.add)
-    among = None if wanted is None else {job.path() for job in todo}
+    among = None if selection is None else {job.path() for job in todo}
     measured = sum(executor.measure(ledger, study, progress, on_compile, among) for study in studies)
     ledger.look_again()
     return len(todo) + measured

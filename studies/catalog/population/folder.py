@@ -25,7 +25,7 @@ SURFACES = (
     *(".stl", ".ply", ".obj", ".off", ".vtk", ".vtp", ".vtu", ".msh"),
     *(".glb", ".gltf", ".nii", ".nii.gz", ".nrrd"),
 )
-"""Names of files that are tried end so."""
+"""Endings of the files that are read."""
 NODES = 550
 """Of the mesh on which hold and probe are placed."""
 DURATION, DAMPING = 8.0, 8.0
@@ -34,19 +34,19 @@ DURATION, DAMPING = 8.0, 8.0
 
 @dataclass(frozen=True)
 class Placed:
-    """What became of a file."""
+    """A file and its scene, or the reason for its refusal."""
 
     path: Path
     scene: Scene | None
     """None where it was refused."""
     words: tuple[str, ...]
-    """What was mended, or the reason."""
+    """The repairs, or the reason."""
 
 
 def placed_organs(folder: Path, unit: str | None = None) -> Iterator[Placed]:
     """Every surface in a folder, by name, as soon as it is placed.
 
-    unit: of files that do not say theirs. Raises StudyError for a folder that is none, or holds no surface.
+    unit: of files that do not state one. Raises StudyError for a folder that does not exist, or holds no surface.
     """
     if not folder.is_dir():
         raise StudyError(f"there is no folder {folder}; give one with surfaces ({', '.join(SURFACES)})")
@@ -61,7 +61,7 @@ def placed_organs(folder: Path, unit: str | None = None) -> Iterator[Placed]:
 
 
 def _placed(path: Path, unit: str | None, name: str) -> Placed:
-    with warnings.catch_warnings(record=True) as told:
+    with warnings.catch_warnings(record=True) as remarks:
         warnings.simplefilter("always")
         try:
             source = Source(path.absolute(), unit)
@@ -69,26 +69,26 @@ def _placed(path: Path, unit: str | None, name: str) -> Placed:
             scene = placed_scene(name, replace(source, unit=mesh.recipe["unit"]), proposal(mesh))
         except StudyError as error:
             return Placed(path, None, (str(error),))
-    return Placed(path, scene, tuple(str(warning.message) for warning in told))
+    return Placed(path, scene, tuple(str(warning.message) for warning in remarks))
 
 
-def placed_scene(name: str, source: Source, found: Proposal, tissue: Tissue = LIVER) -> Scene:
+def placed_scene(name: str, source: Source, placing: Proposal, tissue: Tissue = LIVER) -> Scene:
     """The scene of a body from a file: held at an end, palpated as proposed by a probe in proportion to its size."""
-    radius, depth = (round(share * found.sides[0], 4) for share in (RADIUS, DEPTH))
-    point, outward, end = found.palpation.point, found.palpation.normal, PRESSED * DURATION
+    radius, depth = (round(share * placing.sides[0], 4) for share in (RADIUS, DEPTH))
+    point, outward, end = placing.palpation.point, placing.palpation.normal, PRESSED * DURATION
     inward = scaled(outward, -1.0)
     path = Trajectory((0.0, end), ((0.0, 0.0, 0.0), scaled(inward, depth + GAP)))
     pressed = f"a probe of {1e3 * radius:.3g} mm radius pushed in by {1e3 * depth:.3g} mm"
     return Scene(
         name=name,
-        title=f"{name}: held at {found.held_where}, {pressed}",
+        title=f"{name}: held at {placing.held_where}, {pressed}",
         organ=Organ("file", {"path": str(source.path), "unit": source.unit, "remesh": True}),
         tissue=tissue,
         duration=DURATION,
         frames=FRAMES,
         checkpoints=press_times(0.0, end, CHECKPOINTS, DURATION),
         obstacles=(Sphere(along(point, outward, radius + GAP), radius, path),),
-        held=(Held("end", found.hold),),
+        held=(Held("end", placing.hold),),
         probed=ForceOutput("obstacle", 0, inward),
         damping=DAMPING,
         reference=PLAN,
@@ -96,8 +96,8 @@ def placed_scene(name: str, source: Source, found: Proposal, tissue: Tissue = LI
 
 
 def study_on(study: Study, folder: Path, unit: str | None = None) -> tuple[Study, list[Placed]]:
-    """What a study asks of solid organs that something presses, asked of those in a folder instead; and what became of
-    each file. A study that presses none asks what it asks of its solid organs.
+    """A study with its cases on pressed solid organs transferred to the organs in a folder, and the result for each
+    file. Of a study that presses none, all cases on solid organs are transferred.
 
     Raises StudyError for a unit or folder that is none, one whose every file is refused, and a study without a solid
     organ.

@@ -66,8 +66,8 @@ def judge(
     warn(hints_of(run))
     if replaced:
         warn([f"it replaces an entry named {run.case.method.name} on the same mesh"])
-    beside = [study.name for study in STUDIES if chosen_scene.name in [each.name for each in study.scenes]]
-    command = "report" if entry is not None else f"table {beside[-1]}" if beside else ""
+    names = [study.name for study in STUDIES if chosen_scene.name in [each.name for each in study.scenes]]
+    command = "report" if entry is not None else f"table {names[-1]}" if names else ""
     shown = f", shown next to our methods by `organbench {command}`" if command else ""
     say(f"stored in {path}{shown}")
 

@@ -11,7 +11,7 @@ from rich.text import Text
 
 from studies.cli.mesh_files import LongestSide, Part, Scale, Unit, Yes, ask_before_large, source_of, working
 from studies.cli.terminal import console
-from studies.geometry.api.advice import NODES, tried
+from studies.geometry.api.advice import NODES, with_command
 from studies.geometry.doctor.examine import TISSUE, Findings, examine
 from studies.geometry.files.parts import LISTED
 
@@ -34,7 +34,7 @@ def mesh_check(
         report = examine(source, tissue=(modulus, density))
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # the file is read again
-            report = tried(source, report)
+            report = with_command(source, report)
     if as_json:
         print(json.dumps(report.to_dict(), indent=2, allow_nan=False))
     else:

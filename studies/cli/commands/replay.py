@@ -43,8 +43,8 @@ def replay(
 
 def load_own_files(path: Path, given: list[Path], changed: bool) -> None:
     """Loads the user's files that the run in `path` was made with: those of `given` with the same names, or the only
-    one of `given` whatever its name. Where the record says that they lie is not looked at: a stranger may have written
-    it, and the SHA-256 with it.
+    one of `given` whatever its name. The paths in the record are not opened: a stranger may have written them,
+    and the SHA-256 with them.
 
     Raises StudyError, before any of them is loaded, where one is not among `given`, or its SHA-256 is not the one in
     the record; of files that may have `changed` warns instead.
@@ -52,17 +52,17 @@ def load_own_files(path: Path, given: list[Path], changed: bool) -> None:
     record = peek(path)
     if record.attributes.get(ENTRY) is not None:
         raise StudyError(f"{path} is a result of another program: only that program can run it again")
-    wanted = _own_files(path, record)
+    digests = _own_files(path, record)
     by_name = {file.name: file for file in given}
-    if len(wanted) == len(given) == 1:
-        by_name = {Path(name).name: given[0] for name in wanted}
-    missing = [name for name in wanted if Path(name).name not in by_name]
+    if len(digests) == len(given) == 1:
+        by_name = {Path(name).name: given[0] for name in digests}
+    missing = [name for name in digests if Path(name).name not in by_name]
     if missing:
         raise StudyError(
             f"{path} was made with the program {missing[0]}, and programs run only when you name them: add "
             f"--file {shlex.quote(missing[0])}, or where it is now, if you trust it"
         )
-    files = {by_name[Path(name).name]: digest for name, digest in wanted.items()}
+    files = {by_name[Path(name).name]: digest for name, digest in digests.items()}
     for file, digest in files.items():
         if file.is_file() and hashlib.sha256(file.read_bytes()).hexdigest() != digest:
             sentence = f"{file} is not the file that {path} was made with: its content has changed"
@@ -76,9 +76,9 @@ def load_own_files(path: Path, given: list[Path], changed: bool) -> None:
 def _own_files(path: Path, record: Record) -> dict[str, str]:
     """As `own_files_of`. Raises DamagedFile for a text that this program does not write."""
     try:
-        wanted = own_files_of(record)
+        digests = own_files_of(record)
     except ValueError:
-        wanted = None
-    if not isinstance(wanted, dict) or not all(isinstance(digest, str) for digest in wanted.values()):
+        digests = None
+    if not isinstance(digests, dict) or not all(isinstance(digest, str) for digest in digests.values()):
         raise DamagedFile(f"{path} does not say which files it was made with: delete it, or run its study again")
-    return wanted
+    return digests

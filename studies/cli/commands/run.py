@@ -39,7 +39,7 @@ JOBS = 2
 AGAIN = "timing: re-measure stored cases on this machine; run nothing else"
 MAIN_STUDIES = ", ".join(study.name for study in STUDIES if study.main)
 GIVEN = f"studies, or a FILE.py with STUDY or SCENE ({PROGRAM}); default: {MAIN_STUDIES}"
-Wanted = Callable[[Job], bool] | None
+Selection = Callable[[Job], bool] | None
 Rule = Callable[[Ledger, Job], bool]
 
 
@@ -73,7 +73,7 @@ def run(
 
         studies = [f"{name}{ON}{organs}" for name in studies or [POPULATION]]
     chosen, well = [_chosen(study, smoke, case) for study in find_studies(studies or [])], True
-    todo = [study for study in chosen if not again and plan(ledger, study, _wanted(ledger, study, rules))]
+    todo = [study for study in chosen if not again and plan(ledger, study, _selection(ledger, study, rules))]
     for study in todo:
         warn(check_study(study, drawn=not case))
     if todo and report and not (on or dry):
@@ -83,11 +83,11 @@ def run(
             if again:
                 _time_again(ledger, study, dry, not case)
                 continue
-            wanted = _wanted(ledger, study, rules)
+            selection = _selection(ledger, study, rules)
             if dry:
-                dry_run(console, study.name, plan(ledger, study, wanted), jobs or JOBS, root)
+                dry_run(console, study.name, plan(ledger, study, selection), jobs or JOBS, root)
             else:
-                well = _bring_up_to_date(ledger, study, executor, wanted, not case, failures) and well
+                well = _bring_up_to_date(ledger, study, executor, selection, not case, failures) and well
     if report and not dry:
         _report(ledger, chosen)
     _exit(well, failures, studies or [])
@@ -122,12 +122,12 @@ def _chosen(study: Study, smoke: bool, case: str) -> Study:
 
 
 def _bring_up_to_date(
-    ledger: Ledger, study: Study, executor: Executor, wanted: Wanted, drawn: bool, failures: Failures
+    ledger: Ledger, study: Study, executor: Executor, selection: Selection, drawn: bool, failures: Failures
 ) -> bool:
-    """Runs what must run, and tells how it ended: whether as the study expects."""
-    root, planned = ledger.root, plan(ledger, study, wanted)
+    """Runs what must run, prints how it ended, and returns whether as the study expects."""
+    root, planned = ledger.root, plan(ledger, study, selection)
     with TerminalProgress(console, planned, executor.processes if planned else 1) as progress:
-        count = run_studies(root, [study], executor, progress, wanted, progress.compiling, failures, ledger)
+        count = run_studies(root, [study], executor, progress, selection, progress.compiling, failures, ledger)
     for folder in (study_folder(root, REFERENCES), root / "cache", cache_folder()):
         sweep_parts(folder)
     warn(link_study(ledger, study.name))
@@ -139,7 +139,7 @@ def _bring_up_to_date(
         warn(refresh(ledger, study)[1])
     what = "charts" if drawn else "records"
     say(f"{study.name}: {amounts(progress.done) or 'nothing'} ran, {what} in {study_folder(root, study.name)}")
-    ended = [standing for standing in standings(ledger, study) if wanted is None or wanted(standing.job)]
+    ended = [standing for standing in standings(ledger, study) if selection is None or selection(standing.job)]
     odd = unexpected(study, ended)
     say(f"{study.name}: {summary(ended)}")
     for sentence in causes(odd):
@@ -193,8 +193,8 @@ def _rules(only: str) -> list[Rule]:
     return [lookup(word.strip(), rules, "filter") for word in only.split(",")] if only else []
 
 
-def _wanted(ledger: Ledger, study: Study, rules: list[Rule]) -> Wanted:
-    """What one of the rules lets run; None for none, where all that is not current runs."""
+def _selection(ledger: Ledger, study: Study, rules: list[Rule]) -> Selection:
+    """The jobs that one of the rules allows; None without rules: then all that is not current runs."""
     if not rules:
         return None
     jobs = jobs_of(ledger.root, [study])

@@ -15,7 +15,7 @@ def safe_dt(
     whose = "stability limit" if step.conditionally_stable else "of explicit ones"
     console.print(f"{whose:<18} {1e3 * limit.damped:.4g} ms  (without damping {1e3 * limit.undamped:.4g} ms)")
     console.print(f"dt = auto          {1e3 * step.auto:.4g} ms  (margin {step.margin:.3g})")
-    for dt, outcome in step.tried:
+    for dt, outcome in step.trials:
         console.print(f"run at             {1e3 * dt:.4g} ms  ({dt / limit.damped:.3g} of the limit): {outcome}")
     if step.bracket is not None:
         below, above = step.bracket

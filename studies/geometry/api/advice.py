@@ -1,4 +1,4 @@
-"""The doctor's advice, followed before it is given: a command under which a clean body comes out of the file."""
+"""The doctor's advice, tested before it is given: a command that makes a clean body from the file."""
 
 import shlex
 import warnings
@@ -14,36 +14,37 @@ from studies.geometry.files.units import Source, likely_units, stem_of
 
 NODES = 550
 OPENINGS, FOLDS = 5e-3, 3e-3
-"""[m] that --solid and --smooth are tried with."""
+"""Values of --solid and --smooth in trials [m]."""
 MOST = 100_000
-"""Triangles up to which advice is tried: seconds, which the mesh command does not need again."""
+"""Triangles up to which advice is tested, which takes seconds."""
 BEYOND = {"bad_points", "size", "small", "far_away", "one_sided", "duplicate_tetrahedra"}
 """Findings that no option of the command repairs."""
 
 
-def tried(source: Source, found: Findings) -> Findings:
+def with_command(source: Source, diagnosis: Findings) -> Findings:
     """The findings of the file with the command that fixes all of them, and makes a clean body of NODES surface nodes.
 
-    Where no command does, each advice says what was tried and what came nearest; advice that was not tried begins with
+    Where no command does, each advice names the trials and the nearest one; advice without a trial begins with
     "try"."""
-    codes = {finding.code for finding in found.findings} - {"unit"}
+    codes = {finding.code for finding in diagnosis.findings} - {"unit"}
     if not codes:
-        return found
-    if source.unit is None and not found.measures["unit_said"]:
-        source = replace(source, unit=found.measures["unit"])
+        return diagnosis
+    if source.unit is None and not diagnosis.measures["unit_said"]:
+        source = replace(source, unit=diagnosis.measures["unit"])
     works, attempts = None, dict[str, Findings | None]()
-    if not codes & BEYOND and found.measures["triangles"] <= MOST and likely_units(max(found.measures["size"])):
+    measures = diagnosis.measures
+    if not codes & BEYOND and measures["triangles"] <= MOST and likely_units(max(measures["size"])):
         for how in ways(codes):
             body = attempts[options(how)] = examined(source, how)
             if body is not None and body.clean:
                 works = how
                 break
-    rows = tuple(replace(row, mend=marked(row.mend, works is not None, attempts)) for row in found.findings)
-    return replace(found, findings=rows, command=None if works is None else command(source, works))
+    rows = tuple(replace(row, mend=marked(row.mend, works is not None, attempts)) for row in diagnosis.findings)
+    return replace(diagnosis, findings=rows, command=None if works is None else command(source, works))
 
 
 def marked(mend: str, works: bool, attempts: Mapping[str, Findings | None]) -> str:
-    """The advice: as it is where it works, with "try" in front where it was not tried, else what was tried instead."""
+    """The advice: as it is where it works, with "try" in front where no trial was made, else with the trials."""
     plain = mend.removeprefix(TRY)
     if works or not plain.startswith(COMMAND):
         return plain
@@ -59,7 +60,7 @@ def marked(mend: str, works: bool, attempts: Mapping[str, Findings | None]) -> s
 
 
 def ways(codes: set[str]) -> Iterator[dict[str, Any]]:
-    """What to ask of `scan` for these findings, the gentlest first."""
+    """Arguments of `scan` that may repair these findings, the gentlest first."""
     lids: dict[str, Any] = {"holes": True} if "open" in codes else {}
     if "shell" not in codes:
         if "handles" not in codes:
@@ -71,9 +72,9 @@ def ways(codes: set[str]) -> Iterator[dict[str, Any]]:
 
 
 def examined(source: Source, how: dict[str, Any]) -> Findings | None:
-    """What the doctor says of the body that comes out; None where none does."""
+    """The findings of the body that `scan` makes; None where it makes none."""
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # the mesh command tells of every change
+        warnings.simplefilter("ignore")  # the mesh command reports every change
         try:
             return examine(scan(source, NODES, **how))
         except StudyError:
@@ -81,13 +82,13 @@ def examined(source: Source, how: dict[str, Any]) -> Findings | None:
 
 
 def options(how: dict[str, Any]) -> str:
-    """What asks it of the mesh command: "--nodes 550 --smooth 3"."""
+    """The same as options of the mesh command: "--nodes 550 --smooth 3"."""
     given = [f"--{key} {1e3 * how[key]:g}" for key in ("smooth", "solid") if key in how]
     return " ".join([f"--nodes {NODES}", *given, *(["--close-holes"] if "holes" in how else [])])
 
 
 def command(source: Source, how: dict[str, Any]) -> str:
-    """The command that asks it."""
+    """The whole mesh command."""
     words = ["organbench", "mesh", "--from", str(source.path)]
     side = None if source.longest_side is None else f"{source.longest_side:g}m"
     given = {"--unit": source.unit, "--scale": None if source.scale == 1.0 else f"{source.scale:g}"}

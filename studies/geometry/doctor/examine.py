@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from studies.geometry.doctor.findings import Finding, findings_of
-from studies.geometry.doctor.measures import describe_surface, describe_tetrahedra, describe_welding, springs_see
+from studies.geometry.doctor.measures import describe_springs, describe_surface, describe_tetrahedra, describe_welding
 from studies.geometry.files.content import Content
 from studies.geometry.files.opening import opened
 from studies.geometry.files.parts import Part, parts_in
@@ -22,63 +22,63 @@ TISSUE = 1800.0, 1060.0
 
 @dataclass(frozen=True)
 class Findings:
-    """Everything the doctor saw."""
+    """The measures of a mesh, and its faults."""
 
     name: str
     measures: dict[str, Any]
     """Numbers by name, SI units, JSON-able; docs/meshes.md has the list."""
     findings: tuple[Finding, ...]
     command: str | None = None
-    """That was tried and repairs everything (studies.geometry.api.advice); None where none was found."""
+    """A command line that repairs everything, as a trial showed (studies.geometry.api.advice); None where none does."""
 
     @property
     def clean(self) -> bool:
-        """Whether nothing needs mending."""
+        """Whether the mesh has no fault."""
         return not self.findings
 
     def to_dict(self) -> dict[str, Any]:
         """JSON-able form: {"name", "clean", "measures": {...}, "findings": [{"code", "count", "sentence", "mend"}],
         "command"}."""
         rows = [vars(finding) for finding in self.findings]
-        told = {"name": self.name, "clean": self.clean, "measures": self.measures, "findings": rows}
-        return told | {"command": self.command}
+        data = {"name": self.name, "clean": self.clean, "measures": self.measures, "findings": rows}
+        return data | {"command": self.command}
 
 
 def examine(
     source: str | Path | Source | OrganMesh, *, unit: str | None = None, tissue: tuple[float, float] = TISSUE
 ) -> Findings:
-    """What is to be known about a mesh file or an OrganMesh.
+    """The measures and faults of a mesh file or an OrganMesh.
 
-    source: a Source has also a scale or a part. unit: of the file, one of UNITS; None: the likely one is taken for the
-    numbers, and that is a finding. tissue: shear modulus [Pa] and density [kg/m^3] for the time step. Raises StudyError
-    for a file that holds no mesh, or one of a size beyond all measure.
+    source: a Source may also have a scale or a part. unit: of the file, one of UNITS; None: the numbers use the likely
+    one, and that is a finding. tissue: shear modulus [Pa] and density [kg/m^3] for the time step. Raises StudyError
+    for a file that holds no mesh, or one of an impossible size.
     """
     if isinstance(source, OrganMesh):
         cells = source.tetrahedra if len(source.tetrahedra) else source.triangles
         return examine_cells(source.name, source.points, cells, {"unit": "m", "unit_said": True}, tissue)
-    asked = as_source(source, unit)
-    content = opened(asked)
-    used, metres = how_long(asked, content)
-    check_range(content.longest_side * metres, asked.path.name)
+    file = as_source(source, unit)
+    content = opened(file)
+    used, metres = unit_of(file, content)
+    check_range(content.longest_side * metres, file.path.name)
     # An STL file repeats the corners of every triangle: nothing to report.
-    repeats = asked.path.suffix.lower() == ".stl"
-    found = describe_welding(content.points, content.cells, repeats)
-    found["part_list"] = [] if found["bad_points"] else [row_of(part, metres) for part in parts_in(content)]
+    repeats = file.path.suffix.lower() == ".stl"
+    welding = describe_welding(content.points, content.cells, repeats)
+    welding["part_list"] = [] if welding["bad_points"] else [row_of(part, metres) for part in parts_in(content)]
     points, cells = content.points, content.cells
-    points, cells = (points, cells) if found["bad_points"] else weld(points, cells)
-    return examine_cells(asked.path.name, points * metres, cells, used | found, tissue)
+    points, cells = (points, cells) if welding["bad_points"] else weld(points, cells)
+    return examine_cells(file.path.name, points * metres, cells, used | welding, tissue)
 
 
-def how_long(source: Source, content: Content) -> tuple[dict[str, Any], float]:
-    """The unit, whether it was stated, and metres per unit of the file."""
+def unit_of(source: Source, content: Content) -> tuple[dict[str, Any], float]:
+    """The unit and whether it is certain, as measures, and metres per unit of the file."""
     side = source.scale * content.longest_side
-    said = source.unit or content.unit
+    explicit = source.unit or content.unit
     likely = likely_units(side)
     # The smallest unit that makes an organ of the points, for showing numbers only.
-    unit = said or ("m" if source.longest_side is not None else (likely or ["m"])[-1])
-    known = said is not None or source.longest_side is not None or likely == ["m"]
-    metres = source.metres(content.longest_side, unit) if known else source.scale * UNITS[unit]
-    return {"unit": unit, "unit_said": known}, metres
+    unit = explicit or ("m" if source.longest_side is not None else (likely or ["m"])[-1])
+    certain = explicit is not None or source.longest_side is not None or likely == ["m"]
+    metres = source.metres(content.longest_side, unit) if certain else source.scale * UNITS[unit]
+    return {"unit": unit, "unit_said": certain}, metres
 
 
 def row_of(part: Part, metres: float) -> dict[str, Any]:
@@ -88,11 +88,14 @@ def row_of(part: Part, metres: float) -> dict[str, Any]:
 
 
 def examine_cells(
-    name: str, points: np.ndarray, cells: np.ndarray, known: dict[str, Any], tissue: tuple[float, float]
+    name: str, points: np.ndarray, cells: np.ndarray, file_measures: dict[str, Any], tissue: tuple[float, float]
 ) -> Findings:
-    """Findings about points (n, 3) [m] and triangles (t, 3) or tetrahedra (k, 4); `known` is put in front."""
+    """Findings about points (n, 3) [m] and triangles (t, 3) or tetrahedra (k, 4).
+
+    file_measures: those of the file, which come first.
+    """
     solid = cells.shape[1] == 4
-    measures: dict[str, Any] = {"kind": "tetrahedra" if solid else "surface", "part_list": [], **known}
+    measures: dict[str, Any] = {"kind": "tetrahedra" if solid else "surface", "part_list": [], **file_measures}
     measures = {"bad_points": int((~np.isfinite(points).all(axis=1)).sum())} | measures
     if not measures["bad_points"]:
         triangles = boundary_triangles(cells) if solid else cells
@@ -101,5 +104,5 @@ def examine_cells(
             measures |= describe_tetrahedra(points, cells)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            measures["springs"] = springs_see(points, triangles, cells if solid else None, measures, tissue)
+            measures["springs"] = describe_springs(points, triangles, cells if solid else None, measures, tissue)
     return Findings(name, measures, findings_of(measures))

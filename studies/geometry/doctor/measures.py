@@ -26,30 +26,31 @@ RIM = 500
 def describe_welding(points: np.ndarray, cells: np.ndarray, repeats: bool) -> dict[str, Any]:
     """Points of a file, before they are welded: how many are not finite, double or unused."""
     bad = int((~np.isfinite(points).all(axis=1)).sum())
-    found: dict[str, Any] = {"bad_points": bad, "points_in_file": len(points)}
+    measures: dict[str, Any] = {"bad_points": bad, "points_in_file": len(points)}
     used = len(np.unique(cells))
-    found["unused_points"] = len(points) - used
-    found["duplicate_points"] = 0 if bad or repeats else used - len(weld(points, cells)[0])
-    return found
+    measures["unused_points"] = len(points) - used
+    measures["duplicate_points"] = 0 if bad or repeats else used - len(weld(points, cells)[0])
+    return measures
 
 
 def describe_surface(points: np.ndarray, triangles: np.ndarray) -> dict[str, Any]:
-    """Topology, orientation, size and quality of welded triangles (t, 3) on points (n, 3) [m]."""
+    """Topology, orientation, size and quality of welded triangles (t, 3) on points (n, 3) [m], by name."""
     sound = without_repeats(triangles)
     rows = np.sort(triangles, axis=1)
     collapsed = int((rows[:, 1:] == rows[:, :-1]).any(axis=1).sum())
-    found: dict[str, Any] = {"nodes": len(points), "triangles": len(triangles), "collapsed_triangles": collapsed}
-    found["duplicate_triangles"] = len(triangles) - len(sound) - collapsed
-    found |= describe_edges(sound)
-    found |= describe_parts(points, sound, found)
-    found |= describe_size(points, sound)
-    found["hole_list"] = hole_list(points, oriented(sound, "")[0]) if found["holes"] and found["two_sided"] else []
-    found["self_intersections"] = len(crossing_triangles(points, sound))
-    return found
+    measures: dict[str, Any] = {"nodes": len(points), "triangles": len(triangles), "collapsed_triangles": collapsed}
+    measures["duplicate_triangles"] = len(triangles) - len(sound) - collapsed
+    measures |= describe_edges(sound)
+    measures |= describe_parts(points, sound, measures)
+    measures |= describe_size(points, sound)
+    listed = measures["holes"] and measures["two_sided"]
+    measures["hole_list"] = hole_list(points, oriented(sound, "")[0]) if listed else []
+    measures["self_intersections"] = len(crossing_triangles(points, sound))
+    return measures
 
 
 def describe_edges(triangles: np.ndarray) -> dict[str, Any]:
-    """How the triangles hang together: open, crowded and disagreeing edges, holes, pinched nodes."""
+    """How the triangles are connected: open, crowded and disagreeing edges, holes, pinched nodes."""
     half = triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
     _, counts = np.unique(np.sort(half, axis=1), axis=0, return_counts=True)
     _, agree = edge_pairs(triangles)
@@ -58,7 +59,7 @@ def describe_edges(triangles: np.ndarray) -> dict[str, Any]:
         turned, two_sided = oriented(triangles, "")[0], True
     except StudyError:
         turned, two_sided = triangles, False
-    found: dict[str, Any] = {
+    measures: dict[str, Any] = {
         "open_edges": open_edges,
         "holes": hole_count(turned) if open_edges else 0,
         "crowded_edges": crowded,
@@ -66,15 +67,15 @@ def describe_edges(triangles: np.ndarray) -> dict[str, Any]:
         "disagreeing_edges": int((~agree).sum()),
         "closed": open_edges == 0 and len(triangles) > 0,
     }
-    whole = found["closed"] and two_sided and not crowded
-    found["pinched_nodes"] = len(pinched_nodes(turned)) if whole else 0
-    found["manifold"] = not crowded and not found["pinched_nodes"]
-    found["oriented"] = two_sided and found["disagreeing_edges"] == 0
-    return found
+    whole = measures["closed"] and two_sided and not crowded
+    measures["pinched_nodes"] = len(pinched_nodes(turned)) if whole else 0
+    measures["manifold"] = not crowded and not measures["pinched_nodes"]
+    measures["oriented"] = two_sided and measures["disagreeing_edges"] == 0
+    return measures
 
 
 def hole_count(triangles: np.ndarray) -> int:
-    """Borders that hang together."""
+    """Number of connected borders."""
     return len(set(borders(triangles)[1]))
 
 
@@ -98,26 +99,26 @@ def hole_list(points: np.ndarray, triangles: np.ndarray) -> list[dict[str, Any]]
     return sorted(rows, key=lambda row: -row["width"])
 
 
-def describe_parts(points: np.ndarray, triangles: np.ndarray, known: dict[str, Any]) -> dict[str, Any]:
-    """Separate parts, lumens among them, inside-out ones, and handles.
+def describe_parts(points: np.ndarray, triangles: np.ndarray, surface: dict[str, Any]) -> dict[str, Any]:
+    """Separate parts, lumens among them, inside-out ones, and handles. surface: measures of `describe_edges`.
 
     A part that looks inwards inside the box of the largest one bounds a lumen.
     """
     parts = part_of(triangles)
     pieces = [triangles[parts == k] for k in range(int(parts.max()) + 1)] if len(parts) else []
     boxes = [(points[p.ravel()].min(axis=0), points[p.ravel()].max(axis=0)) for p in pieces]
-    found: dict[str, Any] = {"parts": len(pieces), "lumens": 0, "inside_out_parts": 0, "genus": None}
-    if not pieces or not (known["closed"] and known["oriented"]):
-        return found
+    measures: dict[str, Any] = {"parts": len(pieces), "lumens": 0, "inside_out_parts": 0, "genus": None}
+    if not pieces or not (surface["closed"] and surface["oriented"]):
+        return measures
     main = int(np.argmax([np.linalg.norm(high - low) for low, high in boxes]))
     for k, piece in enumerate(pieces):
         if signed_volume(points, piece) < 0:
             inside = (boxes[k][0] > boxes[main][0]).all() and (boxes[k][1] < boxes[main][1]).all()
-            found["lumens" if k != main and inside else "inside_out_parts"] += 1
-    if known["manifold"]:
+            measures["lumens" if k != main and inside else "inside_out_parts"] += 1
+    if surface["manifold"]:
         euler = len(np.unique(triangles)) - len(unique_edges(triangles)) + len(triangles)
-        found["genus"] = len(pieces) - euler // 2
-    return found
+        measures["genus"] = len(pieces) - euler // 2
+    return measures
 
 
 def describe_size(points: np.ndarray, triangles: np.ndarray) -> dict[str, Any]:
@@ -159,32 +160,33 @@ def describe_tetrahedra(points: np.ndarray, tetrahedra: np.ndarray) -> dict[str,
 
 
 def spread(values: np.ndarray) -> dict[str, float] | None:
-    """Worst, first and fifth percentile, median and largest; None of nothing."""
+    """Smallest value, first and fifth percentile, median and largest; None without values."""
     if not len(values):
         return None
     least, first, fifth, half, most = np.percentile(values, [0, 1, 5, 50, 100])
     return {"min": float(least), "p1": float(first), "p5": float(fifth), "p50": float(half), "max": float(most)}
 
 
-def springs_see(
+def describe_springs(
     points: np.ndarray,
     triangles: np.ndarray,
     tetrahedra: np.ndarray | None,
-    known: dict[str, Any],
+    surface: dict[str, Any],
     tissue: tuple[float, float],
 ) -> dict[str, Any]:
     """Shortest edge [m] and the largest stable time step [s] of springs on this mesh (docs/theory.md, eq. 5.2).
 
-    From the largest frequency of a body where one can be made and is not too large ("measured"), else as the time in
-    which a wave in a Cauchy solid, E = 2.5 mu, crosses the shortest edge ("estimated").
+    surface: measures of `describe_surface`; tissue: shear modulus [Pa] and density [kg/m^3].
+    The step follows from the largest frequency of a body where one can be made and is not too large ("measured"), else
+    it is the time in which a wave in a Cauchy solid, E = 2.5 mu, crosses the shortest edge ("estimated").
     """
     modulus, density = tissue
     material = Material(modulus, density)
-    shortest = known["edge"]["min"] if known["edge"] else 0.0
+    shortest = surface["edge"]["min"] if surface["edge"] else 0.0
     answer = {"shortest_edge": shortest, "shear_modulus": modulus, "density": density}
-    sound = known["closed"] and known["manifold"] and known["oriented"] and not known["collapsed_triangles"]
+    sound = surface["closed"] and surface["manifold"] and surface["oriented"] and not surface["collapsed_triangles"]
     try:
-        if len(points) > MEASURED_BODY or not sound or known["duplicate_triangles"]:
+        if len(points) > MEASURED_BODY or not sound or surface["duplicate_triangles"]:
             raise MassSpringError("no body, or one too large for its frequencies in a moment")
         if tetrahedra is not None:
             body = tetrahedral_body(points, triangles, tetrahedra, material)

@@ -21,7 +21,7 @@ WORDS = "local:N, an address as tcp://HOST:8786, or a FILE.yaml"
 def executor_for(on: str, jobs: int, portable: bool, root: Path, tell: Callable[[str], object]) -> Executor:
     """The executor of `organbench run --on`.
 
-    on: one of WORDS, "" for `jobs` processes of this machine; root: the results folder; tell: hears of workers.
+    on: one of WORDS, "" for `jobs` processes of this machine; root: the results folder; tell: reports on workers.
     Raises StudyError for other words, and where the extra `cluster` is not installed.
     """
     if not on or on.split(":")[0] == LOCAL:

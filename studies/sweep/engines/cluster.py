@@ -96,8 +96,8 @@ class Session:
         """Has a request answered by a process of a fit worker."""
         self.submitted += 1
         options |= {"key": f"{self.name}-{self.submitted}", "priority": -self.submitted, "pure": False}
-        wanted = {self.name: 1, MEGABYTES: megabytes}
-        return self.client.submit(do, self.name, pickle.dumps(request), resources=wanted, **options)
+        resources = {self.name: 1, MEGABYTES: megabytes}
+        return self.client.submit(do, self.name, pickle.dumps(request), resources=resources, **options)
 
     def result(self, future: Future) -> Any:
         """The answer. Raises StudyError when the scheduler is gone, what the request raised, Died, and KilledWorker."""

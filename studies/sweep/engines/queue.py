@@ -41,7 +41,7 @@ NO_PAGES = ("--no-dashboard", "--dashboard-address", "127.0.0.1:0")
 MEMORY_GB = 2.0
 """Of each process by default: a reference of 90,000 unknowns takes 1.4."""
 DISK = "1 GB"
-"""That HTCondor is asked for; results go to the shared folder."""
+"""Request to HTCondor; results go to the shared folder."""
 Kind = Literal["slurm", "sge", "pbs", "lsf", "htcondor", "oar", "command"]
 QUEUES = {
     "slurm": SLURMCluster,
@@ -65,7 +65,7 @@ class Settings:
     workers: Annotated[int, Field(ge=1)]
     """Jobs of the queue, each with one worker."""
     processes: Annotated[int, Field(ge=1)] = 1
-    """Cases at a time of each worker: as many cores are asked for."""
+    """Cases at a time of each worker, which requests as many cores."""
     hours: Annotated[float, Field(gt=0)] | None = None
     """Time of each; None: as long as the queue allows."""
     memory_gb: Annotated[float, Field(gt=0)] | None = None
@@ -123,8 +123,8 @@ def _adapter() -> TypeAdapter[Settings]:
 
 @contextmanager
 def scheduler_with_workers(settings: Settings, root: Path, tell: Listener) -> Iterator[str]:
-    """The address of a scheduler of this process, for which workers are started; `tell` hears how. Inside, clients of
-    this process hold its key; without it nobody talks to the scheduler.
+    """The address of a scheduler of this process, for which workers are started; `tell` reports how. Inside, clients
+    of this process hold its key; without it nobody reaches the scheduler.
 
     Raises StudyError where they cannot be started."""
     logging.getLogger("distributed").setLevel(logging.CRITICAL)
@@ -155,8 +155,8 @@ def cluster_of(settings: Settings, folder: Path) -> SpecCluster:
     scheduler |= {"dashboard": False, "dashboard_address": "127.0.0.1:0"}
     if settings.kind == "command":
         worker = {"cls": Command, "options": {"script": _command_lines(settings, folder), "folder": folder}}
-        wanted = {"cls": Scheduler, "options": scheduler}
-        return SpecCluster(scheduler=wanted, worker=worker)
+        specification = {"cls": Scheduler, "options": scheduler}
+        return SpecCluster(scheduler=specification, worker=worker)
     return QUEUES[settings.kind](**_words(settings, folder), scheduler_options=scheduler)
 
 
@@ -200,10 +200,10 @@ def _start_workers(cluster: SpecCluster, settings: Settings) -> None:
     except (OSError, RuntimeError, ValueError) as error:
         for job in cluster.workers.values():
             job.status = Status.failed  # else closing the cluster fails
-        said, here = " ".join(str(error).split()), "correct `kind`, or run on a machine that has it"
+        reason, here = " ".join(str(error).split()), "correct `kind`, or run on a machine that has it"
         if isinstance(error, OSError):
-            raise StudyError(f"{settings.kind} cannot be used here ({said}): {here}") from error
-        raise StudyError(f"{settings.kind} did not take a job ({said}): correct the settings") from error
+            raise StudyError(f"{settings.kind} cannot be used here ({reason}): {here}") from error
+        raise StudyError(f"{settings.kind} did not take a job ({reason}): correct the settings") from error
 
 
 def _command_lines(settings: Settings, folder: Path) -> str:

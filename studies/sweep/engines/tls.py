@@ -6,7 +6,7 @@ from pathlib import Path
 from studies.base.errors import StudyError
 
 CERTIFICATE, KEY = "certificate.pem", "key.pem"
-"""Beside scheduler.json, in a folder that its owner alone may enter."""
+"""Next to scheduler.json, in a folder that its owner alone may enter."""
 DAYS = 365
 """That a key is good for; its folder's command ends earlier."""
 OPENSSL_SECONDS = 60.0

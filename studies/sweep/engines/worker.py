@@ -45,7 +45,7 @@ class JobPlugin(WorkerPlugin):
         self.machine = ""
 
     async def setup(self, worker: Worker) -> None:
-        """Raises StudyError, and tells the client by an event, when the worker is not fit."""
+        """Raises StudyError, and sends the client an event, when the worker is not fit."""
         self.begin()
         fault = await asyncio.to_thread(self.fault)
         if fault:

@@ -41,12 +41,12 @@ class Advice:
     """Whether the wished errors are the usual ones, because none was named."""
     stored: Stored
     chosen: Judged | None
-    """The cheapest that meets the wish, else the nearest; None where the scene compares nothing that was asked for."""
+    """The cheapest that meets the wish, else the nearest; None where the scene compares no error of the wish."""
     meets: bool
     unknowable: tuple[str, ...]
-    """Errors wished finer than the reference of a scene is known."""
+    """Errors whose wish is below the uncertainty of a reference."""
     ignored: tuple[str, ...]
-    """Errors wished that no scene compares."""
+    """Errors of the wish that no scene compares."""
     alike: tuple[str, ...] = ()
     """Scenes of the same kind, where the scene itself was never run; the errors are the worst of them."""
     short: ShortTiming | None = None
@@ -78,11 +78,11 @@ def advise(
     Raises StudyError for an unknown name, a bound that is not positive, a kind of scene that was never measured, and
     where nothing is stored.
     """
-    asked = lookup(scene, {known.name: known for known in SCENES}, "scene") if isinstance(scene, str) else scene
+    scene = lookup(scene, {one.name: one for one in SCENES}, "scene") if isinstance(scene, str) else scene
     named = Wish(_percent("force", force), _percent("displacement", displacement), _bound("budget", budget))
-    found, alike = _known(asked, Path(results))
-    rows = worst_of(asked, list(found.found.values())) if alike else found.found[asked.name]
-    answer = replace(_chosen(asked, named, rows, found), alike=alike)
+    evidence, alike = _evidence(scene, Path(results))
+    rows = worst_of(scene, list(evidence.cases.values())) if alike else evidence.cases[scene.name]
+    answer = replace(_chosen(scene, named, rows, evidence), alike=alike)
     if answer.chosen is not None:
         answer = replace(answer, unseen=unseen(Path(results), answer.chosen.case))
     return _timed(answer) if timing else _untimed(answer)
@@ -114,9 +114,9 @@ def _bound(name: str, bound: float | None) -> float | None:
     return bound
 
 
-def _known(scene: Scene, results: Path) -> tuple[Stored, tuple[str, ...]]:
-    """What is stored of a scene, or of those of its kind and their names."""
-    own = [known for known in ACCURACY.scenes if replace(known, reference=scene.reference) == scene]
+def _evidence(scene: Scene, results: Path) -> tuple[Stored, tuple[str, ...]]:
+    """What is stored of a scene; of one that the study lacks, what is stored of scenes of its kind, and their names."""
+    own = [other for other in ACCURACY.scenes if replace(other, reference=scene.reference) == scene]
     if own:
         return stored(results, own), ()
     if scene.cuts:
@@ -130,13 +130,13 @@ def _known(scene: Scene, results: Path) -> tuple[Stored, tuple[str, ...]]:
             f"no results apply to scene '{scene.name}': the study '{ACCURACY.name}' has no scene of its kind "
             f"({kind_of(scene)}); `organbench list` names its scenes, or run your own study"
         )
-    found = stored(results, alike)
-    return found, tuple(found.found)
+    evidence = stored(results, alike)
+    return evidence, tuple(evidence.cases)
 
 
-def _chosen(scene: Scene, named: Wish, rows: list[Judged], found: Stored) -> Advice:
-    """The cheapest that meets the wish and keeps the shape, else the nearest. No error is asked for finer than the
-    reference is known."""
+def _chosen(scene: Scene, named: Wish, rows: list[Judged], evidence: Stored) -> Advice:
+    """The cheapest that meets the wish and keeps the shape, else the nearest. No error is judged below the uncertainty
+    of the reference."""
     wish = named.or_usual(scene)
     errors = {name: bound for name in ERRORS if (bound := getattr(wish, name)) is not None}
     ignored = tuple(name for name in errors if not any(getattr(one, name).known for one in rows))
@@ -146,11 +146,12 @@ def _chosen(scene: Scene, named: Wish, rows: list[Judged], found: Stored) -> Adv
     best = None if unknowable else cheapest(rows, wish)
     chosen = best or nearest(rows, wish)
     misshapen = None if unknowable else _misshapen(rows, wish)
-    return Advice(scene, wish, wish != named, found, chosen, best is not None, unknowable, ignored, misshapen=misshapen)
+    usual, meets = wish != named, best is not None
+    return Advice(scene, wish, usual, evidence, chosen, meets, unknowable, ignored, misshapen=misshapen)
 
 
 def _misshapen(rows: list[Judged], wish: Wish) -> Judged | None:
-    """The cheapest that meets the wish if nobody looks at its shape; None where it keeps that."""
+    """The cheapest that meets the wish whatever its shape; None where it keeps the shape."""
     whole = {one.case.key: one for one in rows}
     blind = cheapest((replace(one, shape=UNKNOWN, shape_volume=UNKNOWN) for one in rows), wish)
     return whole[blind.case.key] if blind is not None and whole[blind.case.key].off_shape else None

@@ -29,9 +29,9 @@ PACKAGE = Path(studies.__file__).parent
 
 @dataclass(frozen=True)
 class Stored:
-    """What is known of some scenes."""
+    """The results of some scenes."""
 
-    found: dict[str, list[Judged]]
+    cases: dict[str, list[Judged]]
     """Name of a scene -> its cases that ended well and whose errors are known."""
     where: str
     """Folder or table it was read from."""
@@ -43,21 +43,22 @@ def stored(results: Path, scenes: Iterable[Scene]) -> Stored:
 
     Raises StudyError when nothing is stored of any.
     """
-    wanted = {scene.name: scene for scene in scenes}
-    found, origins = dict[str, list[Judged]](), []
+    by_name = {scene.name: scene for scene in scenes}
+    cases, origins = dict[str, list[Judged]](), []
     published = published_for(results)
-    for name, scene in wanted.items():
-        own, told = _runs(results, scene)
-        others = [one for one in published_rows(published, scene) if one.compared and recipe_text(one.case) not in told]
+    for name, scene in by_name.items():
+        own, recipes = _runs(results, scene)
+        rows = (one for one in published_rows(published, scene) if one.compared)
+        others = [one for one in rows if recipe_text(one.case) not in recipes]
         if own or others:
-            found[name] = over_meshes([*own, *others])
+            cases[name] = over_meshes([*own, *others])
             origins += [str(results / ACCURACY.name)] * bool(own) + [str(_table(published))] * bool(others)
-    if not found:
+    if not cases:
         raise StudyError(
-            f"no results of the study '{ACCURACY.name}' for {', '.join(wanted)}, neither below "
+            f"no results of the study '{ACCURACY.name}' for {', '.join(by_name)}, neither below "
             f"{results / ACCURACY.name} nor in {_table(published)}; `organbench run {ACCURACY.name}` measures it"
         )
-    return Stored(found, " and ".join(dict.fromkeys(origins)))
+    return Stored(cases, " and ".join(dict.fromkeys(origins)))
 
 
 def published_for(results: Path) -> Path:
@@ -78,8 +79,8 @@ def _table(published: Path) -> Path:
 
 
 def _runs(results: Path, scene: Scene) -> tuple[list[Judged], set[str]]:
-    """Runs of a scene that ended well and whose errors are known, and the recipes of all that tell something: those
-    that ended badly too."""
+    """Runs of a scene that ended well and whose errors are known, and the recipes of all runs that count: also of
+    those that ended badly."""
     cases = [case for case in ACCURACY.cases if case.scene.name == scene.name]
     there = tuple(case for case in cases if is_there(case_path(results, ACCURACY.name, case)))
     if not there:

@@ -1,4 +1,4 @@
-"""What is known of a scene that was never run: the worst that was measured in the scenes of its kind."""
+"""Bounds for a scene that was never run: the worst that was measured in the scenes of its kind."""
 
 from collections.abc import Iterable, Sequence
 
@@ -14,10 +14,10 @@ NUMBERS = ("force", "displacement", "cost", "shape", "shape_volume")
 """Of Judged: what is measured."""
 
 
-def same_kind(scene: Scene, known: Iterable[Scene]) -> list[Scene]:
-    """The scenes that are as hollow and loaded in the same way."""
+def same_kind(scene: Scene, scenes: Iterable[Scene]) -> list[Scene]:
+    """Those of `scenes` that are as hollow as `scene` and loaded in the same way."""
     kind = kind_of(scene)
-    return [other for other in known if kind_of(other) == kind]
+    return [other for other in scenes if kind_of(other) == kind]
 
 
 def worst_of(scene: Scene, groups: Sequence[Sequence[Judged]]) -> list[Judged]:
@@ -25,24 +25,24 @@ def worst_of(scene: Scene, groups: Sequence[Sequence[Judged]]) -> list[Judged]:
     and costs; without those that the scene refuses. The step is not known before the body is made."""
     by_recipe = [{recipe_text(one.case): one for one in group} for group in groups]
     common = [text for text in by_recipe[0] if all(text in group for group in by_recipe)]
-    found = []
+    recipes = []
     for text in common:
         same = [group[text] for group in by_recipe]
         case = same[0].case.replaced(scene=scene)
         if _refused(scene, case):
             continue
         force, displacement, cost, shape, volume = (_largest([getattr(one, name) for one in same]) for name in NUMBERS)
-        found.append(Judged(case, force, displacement, cost, shape=shape, shape_volume=volume))
-    return found
+        recipes.append(Judged(case, force, displacement, cost, shape=shape, shape_volume=volume))
+    return recipes
 
 
 def _largest(values: Sequence[Measured]) -> Measured:
     """The one that is farthest from zero, with the largest uncertainty of all; unknown where none is known."""
-    known = [value for value in values if value.known]
-    if not known:
+    numbers = [value for value in values if value.known]
+    if not numbers:
         return UNKNOWN
-    uncertain = [value.uncertainty for value in known if value.uncertainty == value.uncertainty]
-    return Measured(max(known, key=lambda value: abs(value.value)).value, max(uncertain, default=float("nan")))
+    uncertain = [value.uncertainty for value in numbers if value.uncertainty == value.uncertainty]
+    return Measured(max(numbers, key=lambda value: abs(value.value)).value, max(uncertain, default=float("nan")))
 
 
 def _refused(scene: Scene, case: Case) -> bool:

@@ -56,7 +56,7 @@ def _of(rows: pd.DataFrame, entry: Metric) -> Distribution:
     return distribution(dict(zip(names, values, strict=True)), dict(zip(names, floors, strict=True)))
 
 
-def words(found: Unseen) -> str:
+def words(sample: Unseen) -> str:
     """ "on 40 other organs of this kind the median force error is 1.2 %, 95 % are below 8.1 % (6 to 12), ..."."""
 
     def bound(name: str, one: Distribution) -> str:
@@ -65,7 +65,7 @@ def words(found: Unseen) -> str:
         middle = f"the median {name} error is {one.median:{sign}.2g} %"
         return f"{middle}, 95 % are below {one.bound:.2g} % ({low:.2g} to {high:.2g})"
 
-    pairs = (("force", found.force), ("displacement", found.displacement))
+    pairs = (("force", sample.force), ("displacement", sample.displacement))
     errors = [bound(name, one) for name, one in pairs if one.count]
-    lost = f", {found.displacement.lost} more failed" if found.displacement.lost else ""
-    return f"on {found.displacement.count} other organs of this kind ({found.organ}{lost}) {', '.join(errors)}"
+    lost = f", {sample.displacement.lost} more failed" if sample.displacement.lost else ""
+    return f"on {sample.displacement.count} other organs of this kind ({sample.organ}{lost}) {', '.join(errors)}"

@@ -29,14 +29,14 @@ USUAL = " (default target; --force and --displacement set another)"
 
 def wish_words(wish: Wish) -> str:
     """ "force within 3 %, displacement within 1 %, 1 ms of computing per 1 ms of simulated time"."""
-    told = [
+    parts = [
         f"{name} within {bound:.3g} %"
         for name, bound in (("force", wish.force), ("displacement", wish.displacement))
         if bound is not None
     ]
     if wish.budget is not None:
-        told.append(f"at most {cost_words(wish.budget)}")
-    return ", ".join(told)
+        parts.append(f"at most {cost_words(wish.budget)}")
+    return ", ".join(parts)
 
 
 def cost_words(cost: float) -> str:
@@ -46,36 +46,36 @@ def cost_words(cost: float) -> str:
 
 def _verdict(answer: Advice) -> list[str]:
     """Whether the wish is met, and what of it could not be judged."""
-    told = [f"{' and '.join(answer.ignored)} ignored: the scene does not compare it"] if answer.ignored else []
+    lines = [f"{' and '.join(answer.ignored)} ignored: the scene does not compare it"] if answer.ignored else []
     one, wish = answer.chosen, answer.wish
     if answer.misshapen is not None:
         body = answer.misshapen.case.body
-        told.append(
+        lines.append(
             f"not recommended: {body.series}, {body.nodes:,} surface nodes, meets the target, but "
             f"{off_shape(answer.misshapen)}"
         )
     if answer.alike:
-        told.append(
+        lines.append(
             f"this scene has not run: errors are the worst of {', '.join(answer.alike)}, scenes of the same kind"
         )
     for name in answer.unknowable:
-        known = max(getattr(row, name).uncertainty for group in answer.stored.found.values() for row in group)
-        told.append(f"undecided: the reference is only known to ±{known:.2g} % of the {name}")
+        uncertainty = max(getattr(row, name).uncertainty for group in answer.stored.cases.values() for row in group)
+        lines.append(f"undecided: the reference is only known to ±{uncertainty:.2g} % of the {name}")
     if one is None:
-        return [*told, "no recommendation: name an error that the scene compares"]
+        return [*lines, "no recommendation: name an error that the scene compares"]
     if answer.meets:
-        return [*told, *_borderline(one, wish)]
+        return [*lines, *_borderline(one, wish)]
     shares = {name: share for name, share in one.shares(wish).items() if share > 1.0}
     if shares:
         words = [f"{name} {share:.2g} times too large" for name, share in shares.items() if name not in one.off_shape]
         missed = ", ".join([*words, off_shape(one)] if one.off_shape else words)
-        return [*told, f"no body meets it; the closest candidate is ({missed}):"]
+        return [*lines, f"no body meets it; the closest candidate is ({missed}):"]
     blind = (
         "its computing time is not known on this machine"
         if not one.cost.known
         else "measured against it, the closest candidate is:"
     )
-    return [*told, blind]
+    return [*lines, blind]
 
 
 def off_shape(one: Judged) -> str:
@@ -148,11 +148,11 @@ def _computing(answer: Advice, one: Judged) -> str:
     if not one.cost.known:
         return "not known; leave out --no-timing to measure it here"
     spread = f" ± {one.cost.uncertainty:.1g}" if one.cost.uncertainty == one.cost.uncertainty else ""
-    told = f"{one.cost.value:.3g}{spread} ms per 1 ms of simulated time, {1.0 / one.cost.value:.3g} times real time"
+    text = f"{one.cost.value:.3g}{spread} ms per 1 ms of simulated time, {1.0 / one.cost.value:.3g} times real time"
     if answer.short is not None:
         whole = answer.scene.duration
-        return f"{told}, on this machine, timed over the first {answer.short.covered:.2g} of {whole:g} s"
-    return f"{told}, on {'this' if one.timed_here else 'another'} machine"
+        return f"{text}, on this machine, timed over the first {answer.short.covered:.2g} of {whole:g} s"
+    return f"{text}, on {'this' if one.timed_here else 'another'} machine"
 
 
 def _command(answer: Advice, case: Case) -> str:

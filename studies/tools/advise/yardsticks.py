@@ -30,12 +30,12 @@ def yardsticks(results: Path, scene: Scene) -> list[Yardstick]:
     for a scene that the study does not have. Raises StudyError where nothing of it is stored."""
     if scene not in ACCURACY.scenes:
         return []
-    rows = stored(results, [scene]).found[scene.name]
+    rows = stored(results, [scene]).cases[scene.name]
     wish = usual_wish(scene)
     paper = [one for one in rows if one.advisable and one.case.body.kind == "surface" and one.case.body.nodes == PAPER]
     best = cheapest(rows, wish) or nearest(rows, wish)
-    found = [("the paper's body", one) for one in paper[:1]] + [("recommended", best)] * (best is not None)
-    return [_row(name, one) for name, one in found if one is not None]
+    pairs = [("the paper's body", one) for one in paper[:1]] + [("recommended", best)] * (best is not None)
+    return [_row(name, one) for name, one in pairs if one is not None]
 
 
 def _row(name: str, one: Judged) -> Yardstick:

@@ -1,4 +1,4 @@
-"""The recipe of an organ, fitted on its scenes against the reference, with trials that show what the fit is worth."""
+"""The recipe of an organ, fitted on its scenes against the reference, with trials on other scenes."""
 
 from collections.abc import Iterable, Sequence
 from datetime import UTC, datetime
@@ -48,13 +48,13 @@ def calibrate(
     on_compile: CompileListener | None = None,
     folds: Sequence[Fold] | None = None,
 ) -> Calibration:
-    """Fits few numbers of a body to the references of an organ, tries the fit on other scenes, stores what came of it.
+    """Fits a few numbers of a body to the references of an organ, tests the fit on other scenes, and stores both.
 
     organ: a name of SHAPES, with `folds` any name; body: what to start from, or "tetrahedral" or "surface" for one of
-    550 nodes; jobs: processes for references and first runs, of which `progress` is told; on_compile: hears what
-    they compile; folds: scenes to fit and to judge on, without them those of `folds_of`.
-    All runs lie below `results` and are not made twice: an interrupted calibration goes on.
-    Raises StudyError for an organ or a body that is not calibrated, a reference that cannot be had, and a scene in
+    550 nodes; jobs: processes for references and first runs, which `progress` shows; on_compile: hears what they
+    compile; folds: scenes to fit and to judge on, by default those of `folds_of`.
+    All runs are stored below `results`: an interrupted calibration continues.
+    Raises StudyError for an organ or a body that is not calibrated, a missing reference, and a scene in
     which the body ends badly before anything is fitted.
     """
     root, tried = Path(results), tuple(folds if folds is not None else folds_of(organ))
@@ -67,9 +67,9 @@ def calibrate(
         bring_up_to_date(tasks, root, jobs, progress or Silent(), on_compile or (lambda name: None))
         ledger.look_again()
     with watching(on_compile or (lambda name: None)):
-        found = calibration(organ, start, tried, Measurements(ledger, scenes), progress or Silent())
-    write_calibration(root, found)
-    return found
+        outcome = calibration(organ, start, tried, Measurements(ledger, scenes), progress or Silent())
+    write_calibration(root, outcome)
+    return outcome
 
 
 def _scenes_of(folds: Sequence[Fold]) -> list[Scene]:
@@ -119,13 +119,13 @@ def values_of(recipe: BodyRecipe, parameters: Iterable[Parameter]) -> dict[str, 
 
 def _trial(start: BodyRecipe, fold: Fold, runs: Measurements, progress: Progress) -> Trial:
     before = {scene.name: runs.first_errors(scene, start) for scene in fold.scenes}
-    found = fit(start, fold.fitted, runs.errors)
-    after = {scene.name: runs.errors(scene, found.recipe) for scene in fold.scenes}
+    best = fit(start, fold.fitted, runs.errors)
+    after = {scene.name: runs.errors(scene, best.recipe) for scene in fold.scenes}
     rows = tuple(_errors(scene, scene in fold.fitted, before[scene.name], after[scene.name]) for scene in fold.scenes)
     force, displacement = (_verdict(rows, quantity) for quantity in ("force", "displacement"))
-    values = values_of(found.recipe, found.parameters)
+    values = values_of(best.recipe, best.parameters)
     progress.advance(FITTING, " and ".join(scene.name for scene in fold.fitted))
-    return Trial(values, rows, force, displacement, tuple(_remarks(start, fold, found, after)))
+    return Trial(values, rows, force, displacement, tuple(_remarks(start, fold, best, after)))
 
 
 def _errors(scene: Scene, fitted: bool, before: Judged, after: Judged | None) -> SceneErrors:
@@ -145,17 +145,17 @@ def _verdict(rows: Sequence[SceneErrors], quantity: str) -> Verdict | None:
     return verdict_of([pair for pair in own if pair], [pair for pair in others if pair])
 
 
-def _remarks(start: BodyRecipe, fold: Fold, found: Fit, after: dict[str, Judged | None]) -> Iterable[str]:
+def _remarks(start: BodyRecipe, fold: Fold, best: Fit, after: dict[str, Judged | None]) -> Iterable[str]:
     own = {scene.organ.shape for scene in fold.fitted}
     others = dict.fromkeys(scene.organ.shape for scene in fold.judged if scene.organ.shape not in own)
     if others:
         yield f"judged on other organs ({', '.join(others)})"
-    left = [parameter.name for parameter in parameters_of(start) if parameter not in found.parameters]
+    left = [parameter.name for parameter in parameters_of(start) if parameter not in best.parameters]
     if left:
         yield f"{' and '.join(left)} not fitted: the scene compares fewer errors than the body has parameters"
-    if found.at_bound:
-        yield f"{' and '.join(found.at_bound)} ended at a bound of the search range"
-    if not found.converged:
+    if best.at_bound:
+        yield f"{' and '.join(best.at_bound)} ended at a bound of the search range"
+    if not best.converged:
         yield "the search stopped before it converged"
     lost = [name for name, errors in after.items() if errors is None]
     if lost:

@@ -1,4 +1,4 @@
-"""Few numbers of a recipe by least squares, with few runs."""
+"""A few numbers of a recipe by least squares, with few runs."""
 
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
@@ -17,9 +17,9 @@ DIFFERENCE = 0.05
 at the bottom of an error is known to half of it, where the error is flat."""
 TOLERANCE = 3e-3
 MOST = 15
-"""Trial steps at most."""
+"""Largest number of trial steps."""
 LOST = 1e3
-"""What a run that ended badly counts, in goals: the search turns back from it."""
+"""Residual of a run that ended badly, in goals: the search turns back from it."""
 NEAR_BOUND = 1.1
 """A parameter this near to the end of its range, as a factor, ended there: the search stays inside."""
 
@@ -28,7 +28,7 @@ Measure = Callable[[Scene, BodyRecipe], Judged | None]
 
 
 class Fit(NamedTuple):
-    """What a fit found."""
+    """A fitted recipe, and how the search ended."""
 
     recipe: BodyRecipe
     parameters: tuple[Parameter, ...]
@@ -49,8 +49,8 @@ def fit(start: BodyRecipe, scenes: Sequence[Scene], measure: Measure) -> Fit:
     parameters = parameters_of(start)[:count]
 
     def residuals(logs: np.ndarray) -> np.ndarray:
-        found = _residuals(scaled(start, parameters, np.exp(logs).tolist()), scenes, measure)
-        return np.array(found) if len(found) == count else np.full(count, LOST)
+        values = _residuals(scaled(start, parameters, np.exp(logs).tolist()), scenes, measure)
+        return np.array(values) if len(values) == count else np.full(count, LOST)
 
     def slopes(logs: np.ndarray) -> np.ndarray:
         here = residuals(logs)
@@ -60,26 +60,26 @@ def fit(start: BodyRecipe, scenes: Sequence[Scene], measure: Measure) -> Fit:
     low, high = (np.log([getattr(parameter, end) for parameter in parameters]) for end in ("lowest", "highest"))
     first = np.zeros(len(parameters))
     limits = {"bounds": (low, high), "xtol": TOLERANCE, "ftol": TOLERANCE, "max_nfev": MOST}
-    found = least_squares(residuals, first, jac=slopes, **limits)  # pyright: ignore[reportArgumentType]
+    solution = least_squares(residuals, first, jac=slopes, **limits)  # pyright: ignore[reportArgumentType]
     margin = np.log(NEAR_BOUND)
-    at_bound = (found.x < low + margin) | (found.x > high - margin)
+    at_bound = (solution.x < low + margin) | (solution.x > high - margin)
     names = tuple(parameter.name for parameter, at in zip(parameters, at_bound, strict=True) if at)
-    return Fit(scaled(start, parameters, np.exp(found.x).tolist()), parameters, bool(found.status > 0), names)
+    return Fit(scaled(start, parameters, np.exp(solution.x).tolist()), parameters, bool(solution.status > 0), names)
 
 
 def _residuals(recipe: BodyRecipe, scenes: Sequence[Scene], measure: Measure) -> list[float]:
     """Every known error over its goal; none at all where a run ended badly."""
-    found: list[float] = []
+    residuals: list[float] = []
     for scene in scenes:
         errors, wish = measure(scene, recipe), usual_wish(scene)
         if errors is None:
             return []
-        found += [
+        residuals += [
             error.value / _scale(error, goal)
             for error, goal in ((errors.force, wish.force), (errors.displacement, wish.displacement))
             if error.known and goal is not None
         ]
-    return found
+    return residuals
 
 
 def _scale(error: Measured, goal: float) -> float:

@@ -26,10 +26,10 @@ class Fold:
 def own_scenes(organ: str) -> tuple[Scene, ...]:
     """The scenes of an organ that end at rest and have a reference. Raises StudyError where there is none."""
     lookup(organ, SHAPES, "organ")
-    known = judged_at_rest()
-    own = tuple(scene for scene in known if scene.organ.shape == organ)
+    scenes = judged_at_rest()
+    own = tuple(scene for scene in scenes if scene.organ.shape == organ)
     if not own:
-        names = ", ".join(dict.fromkeys(scene.organ.shape for scene in known))
+        names = ", ".join(dict.fromkeys(scene.organ.shape for scene in scenes))
         raise StudyError(f"organ '{organ}' has no scene with a reference to fit; choose one of {names}")
     return own
 

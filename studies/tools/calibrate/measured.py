@@ -1,4 +1,4 @@
-"""The runs that a calibration rests on: made once, stored with the others, read back where they are current."""
+"""The runs of a calibration: made once, stored with the others, read back where they are current."""
 
 from collections.abc import Iterable
 from pathlib import Path

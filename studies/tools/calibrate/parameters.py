@@ -10,7 +10,7 @@ from studies.base.lookup import lookup
 from studies.runs.case import BodyRecipe
 
 DIGITS = 4
-"""Significant digits of a fitted value: a record is found again by the recipe, and no error asks for more."""
+"""Significant digits of a fitted value: the recipe is the key of a record, and no error needs more."""
 INNER = list(SURFACE_WEIGHTS).index(SpringKind.INNER)
 KINDS = ("tetrahedral", "surface")
 FEW_VOLUMES = ("scene", "whole")
@@ -26,7 +26,7 @@ class Parameter:
     """The recipe with another value."""
     lowest: float
     highest: float
-    """Factors on the first value between which it is sought."""
+    """Factors on the first value: the range of the search."""
 
 
 def weights_of(recipe: BodyRecipe) -> tuple[float, ...]:

@@ -1,4 +1,4 @@
-"""A calibration as a small JSON file: the recipe, how it was found and judged, by which code, and a digest of all."""
+"""A calibration as a small JSON file: the recipe, how it was fitted and judged, by which code, and a digest."""
 
 import hashlib
 import json
@@ -18,7 +18,7 @@ from studies.tools.calibrate.verdict import Compared, Verdict
 STUDY = "calibration"
 """Folder below the results: the files, and the records of all runs that were made for them."""
 KIND, SCHEMA = "organbench calibration", 1
-ANEW = "`organbench calibrate` makes one"
+REMEDY = "`organbench calibrate` makes one"
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ class Trial:
 
 @dataclass(frozen=True)
 class Calibration:
-    """A recipe fitted on all scenes of an organ, and what trials say of such a fit."""
+    """A recipe fitted on all scenes of an organ, and the trials of such a fit."""
 
     organ: str
     start: BodyRecipe
@@ -98,29 +98,29 @@ def read_calibration(path: Path | str) -> Calibration:
     try:
         whole = json.loads(Path(path).read_text(encoding="utf-8"))
     except FileNotFoundError as error:
-        raise StudyError(f"there is no calibration {path}; {ANEW}") from error
+        raise StudyError(f"there is no calibration {path}; {REMEDY}") from error
     except OSError as error:
         raise StudyError(
             f"{path} cannot be read ({error.strerror}); give a file that `organbench calibrate` wrote"
         ) from error
     except ValueError as error:
-        raise DamagedFile(f"{path} is damaged or not a calibration ({_first_line(error)}); {ANEW}") from error
+        raise DamagedFile(f"{path} is damaged or not a calibration ({_first_line(error)}); {REMEDY}") from error
     if not isinstance(whole, dict) or whole.get("kind") != KIND or not isinstance(whole.get("calibration"), dict):
-        raise StudyError(f"{path} is JSON, but not a calibration; {ANEW}")
+        raise StudyError(f"{path} is JSON, but not a calibration; {REMEDY}")
     if whole.get("schema") != SCHEMA:
-        raise OtherVersion(f"{path} was written by another version in another format; {ANEW}")
+        raise OtherVersion(f"{path} was written by another version in another format; {REMEDY}")
     data = whole["calibration"]
     if whole.get("digest") != _digest(data):
-        raise DamagedFile(f"{path} was changed after it was written, so it no longer records a fit; {ANEW}")
+        raise DamagedFile(f"{path} was changed after it was written, so it no longer records a fit; {REMEDY}")
     try:
-        found = _adapter().validate_python(data)
+        calibration = _adapter().validate_python(data)
     except ValidationError as error:
         raise OtherVersion(
-            f"{path} has content that this version cannot read ({_first_line(error)}); {ANEW}"
+            f"{path} has content that this version cannot read ({_first_line(error)}); {REMEDY}"
         ) from error
-    if _data(found) != data:
-        raise OtherVersion(f"{path} has settings that this version does not know; {ANEW}")
-    return found
+    if _data(calibration) != data:
+        raise OtherVersion(f"{path} has settings that this version does not know; {REMEDY}")
+    return calibration
 
 
 def calibrated(path: Path | str) -> BodyRecipe:

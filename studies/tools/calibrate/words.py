@@ -20,32 +20,32 @@ SENTENCES = {
 }
 
 
-def lines_of(found: Calibration) -> list[str]:
+def lines_of(calibration: Calibration) -> list[str]:
     """A calibration in words, line by line."""
-    start = found.start
-    lines = [f"{found.organ}: {start.series} body, {start.nodes:,} surface nodes", *HEAD]
-    for trial in found.trials:
-        lines += _trial(found, trial)
+    start = calibration.start
+    lines = [f"{calibration.organ}: {start.series} body, {start.nodes:,} surface nodes", *HEAD]
+    for trial in calibration.trials:
+        lines += _trial(calibration, trial)
     for quantity in ("force", "displacement"):
-        told = [verdict for trial in found.trials if (verdict := getattr(trial, quantity)) is not None]
-        if told:
-            lines += _wrapped(f"{quantity}: {SENTENCES[worst(told)]}", "")
-    own = " and ".join(found.fitted)
-    return [*lines, *_wrapped(f"stored recipe, fitted on {own}: {_values(found, found.parameters)}", "")]
+        verdicts = [verdict for trial in calibration.trials if (verdict := getattr(trial, quantity)) is not None]
+        if verdicts:
+            lines += _wrapped(f"{quantity}: {SENTENCES[worst(verdicts)]}", "")
+    own = " and ".join(calibration.fitted)
+    return [*lines, *_wrapped(f"stored recipe, fitted on {own}: {_values(calibration, calibration.parameters)}", "")]
 
 
-def _trial(found: Calibration, trial: Trial) -> Iterable[str]:
-    yield from _wrapped(f"fitted on {' and '.join(trial.fitted)}: {_values(found, trial.parameters)}", "  ")
+def _trial(calibration: Calibration, trial: Trial) -> Iterable[str]:
+    yield from _wrapped(f"fitted on {' and '.join(trial.fitted)}: {_values(calibration, trial.parameters)}", "  ")
     for errors in trial.errors:
         yield _row(errors)
-    told = {"force": trial.force, "displacement": trial.displacement}
-    verdicts = ", ".join(f"{name} {verdict}" for name, verdict in told.items() if verdict is not None)
+    by_quantity = {"force": trial.force, "displacement": trial.displacement}
+    verdicts = ", ".join(f"{name} {verdict}" for name, verdict in by_quantity.items() if verdict is not None)
     yield from _wrapped("; ".join([f"verdict: {verdicts or 'nothing to compare'}", *trial.remarks]), "    ")
 
 
-def _values(found: Calibration, values: dict[str, float]) -> str:
+def _values(calibration: Calibration, values: dict[str, float]) -> str:
     """ "stiffness 1.35 (was 1)"."""
-    first = {parameter.name: parameter.read(found.start) for parameter in parameters_of(found.start)}
+    first = {parameter.name: parameter.read(calibration.start) for parameter in parameters_of(calibration.start)}
     return ", ".join(f"{name} {value:.4g} (was {first[name]:.4g})" for name, value in values.items())
 
 

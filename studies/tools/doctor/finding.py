@@ -1,4 +1,4 @@
-"""What a look at the machine finds."""
+"""The result of a check of the machine."""
 
 from dataclasses import dataclass
 from enum import StrEnum
@@ -15,23 +15,23 @@ class Level(StrEnum):
 
 @dataclass(frozen=True)
 class Finding:
-    """A check: its result in words, and the shell command that fixes it."""
+    """A check: its result as a sentence, and the shell command that repairs a fault."""
 
     level: Level
-    said: str
+    sentence: str
     mend: str = ""
 
 
-def ok(said: str) -> Finding:
+def ok(sentence: str) -> Finding:
     """Nothing to do."""
-    return Finding(Level.OK, said)
+    return Finding(Level.OK, sentence)
 
 
-def note(said: str, mend: str = "") -> Finding:
-    """Something is left out."""
-    return Finding(Level.NOTE, said, mend)
+def note(sentence: str, mend: str = "") -> Finding:
+    """Something is left out or slower."""
+    return Finding(Level.NOTE, sentence, mend)
 
 
-def fault(said: str, mend: str) -> Finding:
+def fault(sentence: str, mend: str) -> Finding:
     """Something that is needed is missing."""
-    return Finding(Level.FAULT, said, mend)
+    return Finding(Level.FAULT, sentence, mend)

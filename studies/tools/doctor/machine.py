@@ -1,4 +1,4 @@
-"""What the machine gives: cores, memory, room on the disk, folders that can be written to."""
+"""Resources of the machine: cores, memory, room on the disk, folders that can be written to."""
 
 import os
 import shlex
@@ -19,23 +19,23 @@ MEMORY = 4
 
 
 def machine(root: Path) -> list[Finding]:
-    """Cores, memory, what the environment sets, the caches, and room for results below `root`."""
+    """Cores, memory, settings of the environment, the caches, and room for results below `root`."""
     caches = [
         ("compiled code", compiled_folder(), "NUMBA_CACHE_DIR"),
         ("meshes", mesh_folder(), "ORGANBENCH_CACHE"),
         ("code fingerprints", user_cache(), "XDG_CACHE_HOME"),
     ]
-    found = [cores(), memory(this_machine().memory_gb), compiler()]
-    found += [cache(what, folder, variable) for what, folder, variable in caches]
-    return [*found, room("results", root), room("compiled code", compiled_folder())]
+    findings = [cores(), memory(this_machine().memory_gb), compiler()]
+    findings += [cache(what, folder, variable) for what, folder, variable in caches]
+    return [*findings, room("results", root), room("compiled code", compiled_folder())]
 
 
 def cores() -> Finding:
     """How many cores this process may use."""
     usable = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     there = os.cpu_count() or 1
-    said = f"{usable} of {there} cores may be used"
-    return ok(said) if usable > 1 else note(f"{said}: other programs disturb the frame times")
+    sentence = f"{usable} of {there} cores may be used"
+    return ok(sentence) if usable > 1 else note(f"{sentence}: other programs disturb the frame times")
 
 
 def memory(gigabytes: int | None) -> Finding:
@@ -81,7 +81,7 @@ def room(what: str, folder: Path) -> Finding:
     """Whether the disk of a folder, or of the nearest one above that is there, has room."""
     there = next(place for place in (folder.absolute(), *folder.absolute().parents) if place.is_dir())
     free = shutil.disk_usage(there).free
-    said = f"{free / 1e9:.1f} GB free for {what} in {folder}"
+    sentence = f"{free / 1e9:.1f} GB free for {what} in {folder}"
     if free >= ROOM:
-        return ok(said)
-    return fault(f"{said}, {ROOM / 1e9:g} are needed", f"du -xsh {shlex.quote(str(there))}/* | sort -h | tail")
+        return ok(sentence)
+    return fault(f"{sentence}, {ROOM / 1e9:g} are needed", f"du -xsh {shlex.quote(str(there))}/* | sort -h | tail")

@@ -12,7 +12,7 @@ from studies.tools.doctor.machine import cannot_write
 
 
 def results_folder(root: Path, studies: Collection[str]) -> list[Finding]:
-    """How the files below `root` stand; studies: names that `organbench run` knows."""
+    """The state of the files below `root`; studies: the names that `organbench run` accepts."""
     if not root.exists():
         return [note(f"no results yet: there is no folder {root}", "organbench run")]
     if not root.is_dir():
@@ -48,8 +48,8 @@ def _files(root: Path, studies: Collection[str]) -> Iterator[Finding]:
 def _again(root: Path, files: Collection[Path], studies: Collection[str]) -> str:
     """The line that replaces files: by running their studies, or by removing what no study of the catalogue wrote."""
     names = sorted({file.parent.name for file in files})
-    known = [name for name in names if name in studies]
+    runnable = [name for name in names if name in studies]
     lines = [f"rm {shlex.quote(str(file))}" for file in files if file.parent.name not in studies]
-    if known:
-        lines.append(f"organbench run {' '.join(known)} --only stale --results {shlex.quote(str(root))}")
+    if runnable:
+        lines.append(f"organbench run {' '.join(runnable)} --only stale --results {shlex.quote(str(root))}")
     return " && ".join(lines)

@@ -40,9 +40,9 @@ def software() -> list[Finding]:
     except PackageNotFoundError:
         line = f"{shlex.quote(sys.executable)} -m pip install --editable ."
         return [fault(f"{DISTRIBUTION} itself is not installed, so its requirements are unknown", line)]
-    found = [ok(f"{DISTRIBUTION} {version(DISTRIBUTION)}, Python {platform.python_version()}"), packages(needed)]
-    found += [loads(module) for module in NATIVE if is_installed(module)]
-    return found + [extra(name, required(name)) for name in extras()]
+    findings = [ok(f"{DISTRIBUTION} {version(DISTRIBUTION)}, Python {platform.python_version()}"), packages(needed)]
+    findings += [loads(module) for module in NATIVE if is_installed(module)]
+    return findings + [extra(name, required(name)) for name in extras()]
 
 
 def required(extra: str = "") -> list[Requirement]:

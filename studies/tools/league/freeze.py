@@ -1,7 +1,7 @@
 """`python -m studies.tools.league.freeze SECRET`: the frozen set: hashes of its open and its held-back scenes.
 
 SECRET is a folder outside of this repository. The held-back scenes are drawn there with seeds that nobody can guess,
-and their references are solved; the set tells hashes alone. A folder that already has them is used as it is.
+and their references are solved; the set holds only hashes. A folder that already has them is used as it is.
 """
 
 import hashlib
@@ -27,7 +27,7 @@ from studies.scene.scene import Scene
 
 OPEN = (BALL_SQUEEZE, BALL_CLAMPED, LIVER_PRESS, LIVER_PROBE, KIDNEY_PROBE)
 HELD_BACK = ("liver", "kidney", "stomach")
-"""Organs of populations."""
+"""Organs of populations whose scenes are held back."""
 NODES = (150, 300)
 """Vertices on the outer surface of the meshes on which results are handed in."""
 LEAST = {"stomach": 400}
@@ -45,16 +45,16 @@ def meshes_of(scene: Scene, nodes: tuple[int, ...] = NODES) -> dict[str, str]:
 
 def open_scene(scene: Scene) -> dict[str, Any]:
     """Its entry in the set. Raises StudyError for a scene without a published reference."""
-    known = published(scene)
-    if known is None:
+    entry = published(scene)
+    if entry is None:
         raise StudyError(f"{scene.name} has no published reference")
-    told = json.loads((FOLDER / INDEX).read_text(encoding="utf-8"))["references"][scene.name]["relative bars"]
-    bars = {name: round(100.0 * told[quantity], 6) for name, quantity in JUDGED_BY.items() if quantity in told}
-    return {"reference": known.sha256, "physics": physics(scene), "bars": bars, "meshes": meshes_of(scene)}
+    relative = json.loads((FOLDER / INDEX).read_text(encoding="utf-8"))["references"][scene.name]["relative bars"]
+    bars = {name: round(100.0 * relative[quantity], 6) for name, quantity in JUDGED_BY.items() if quantity in relative}
+    return {"reference": entry.sha256, "physics": physics(scene), "bars": bars, "meshes": meshes_of(scene)}
 
 
 def held_back(organ: str, folder: Path, solved: bool) -> dict[str, Any]:
-    """Draws and, if `solved`, solves the scene below `folder`, where that was not done; what the set tells of it."""
+    """Draws and, if `solved`, solves the scene below `folder`, where it is missing; its entry in the set."""
     place = folder / organ
     place.mkdir(parents=True, exist_ok=True)
     seed, file = place / "seed.txt", place / "reference.h5"

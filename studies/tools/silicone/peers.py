@@ -72,17 +72,17 @@ def write_beam(folder: Path, beam: Beam, youngs: float, load: Load, damping: flo
 
 
 def peer_row(peer: Peer, load: Load, youngs: float, folder: Path, environments: Path) -> Point:
-    """What a program says of a load. Raises StudyError with the reason where it says nothing."""
+    """The result of a program for a load. Raises StudyError with the reason where it has none."""
     if peer.absent:
         raise StudyError(f"{peer.name}: {peer.absent}")
     given, out = folder / load.name.replace(" ", "_"), folder / f"{peer.name}.npz"
     write_beam(given, MESH, youngs, load, fitted_damping(), DURATION)
-    known = Peer(peer.name, peer.module, "straight", peer.packages, dict(peer.settings) | STEPS.get(peer.name, {}))
-    status, message = hand_over(Attempt(known, BALL_CLAMPED, 0), given, out, LIMIT, environments)
+    contender = Peer(peer.name, peer.module, "straight", peer.packages, dict(peer.settings) | STEPS.get(peer.name, {}))
+    status, message = hand_over(Attempt(contender, BALL_CLAMPED, 0), given, out, LIMIT, environments)
     if status != Status.OK:
         raise StudyError(message)
-    found = np.load(out, allow_pickle=False)
-    swing = swing_of(found["t"], marker_sag(found["positions"][0], found["positions"]).mean(axis=1))
+    arrays = np.load(out, allow_pickle=False)
+    swing = swing_of(arrays["t"], marker_sag(arrays["positions"][0], arrays["positions"]).mean(axis=1))
     return Point(peer.name, load.newton, 1e3 * swing.sag, swing.frequency, swing.damping)
 
 
@@ -93,7 +93,7 @@ def main(
     only: Annotated[str, typer.Option(help="one program by its name")] = "",
 ) -> None:
     """Puts the rows of programs into silicone.csv, in place of those they have there, and draws the chart again; what
-    cannot be done is said on standard error. `python -m studies.tools.silicone.main` makes the table first. Raises
+    fails is reported on standard error. `python -m studies.tools.silicone.main` makes the table first. Raises
     StudyError for an unknown program, without the table, and where no program releases the beam."""
     if only:
         lookup(only, [peer.name for peer in PEERS], "program (--only)")

@@ -20,32 +20,32 @@ def published_scenes() -> dict[str, Scene]:
 
 
 def solved_again(scene: Scene) -> list[Check]:
-    """The scene solved by its plan, held against its published reference; allowed are both error bars together.
+    """Checks of the scene, solved again by its plan, against the published one, within the sum of both error bars.
 
     Raises StudyError where it does not converge.
     """
     with tempfile.TemporaryDirectory() as folder:
         solve(Path(folder), ReferenceSolve(scene))
         again = load_reference(Path(folder), scene)
-    known = reference_for(Path(), scene)
-    assert again is not None and known is not None  # published scenes have a plan
-    return checks_of(known, again)
+    former = reference_for(Path(), scene)
+    assert again is not None and former is not None  # published scenes have a plan
+    return checks_of(former, again)
 
 
-def checks_of(known: Reference, again: Reference) -> list[Check]:
+def checks_of(former: Reference, again: Reference) -> list[Check]:
     """A check for each quantity of the scene, at the sample points of the second."""
     place, count = f"{again.scene.name}, {len(again.meshes)} meshes", int(again.record.attributes["unknowns"])
-    there, here = (sample_at(reference, again.at) for reference in (known, again))
+    there, here = (sample_at(reference, again.at) for reference in (former, again))
     checks = []
     for name, bar in again.total_uncertainty.items():
-        allowed = bar + known.total_uncertainty[name]
+        allowed = bar + former.total_uncertainty[name]
         apart = QUANTITIES[name](again.at, here, there)
         checks.append(Check(name, "1", 0.0, apart, allowed, place, count, absolute=True))
     return checks
 
 
 def sample_at(reference: Reference, at: SamplePoints) -> Sample:
-    """What the finest mesh of a reference says at sample points of another one's family."""
+    """The finest mesh of a reference, sampled at points of another reference."""
     finest = reference.meshes[0]
     series = {name: reference.field(name) for name in ("volume", "pressure", "lumen_pressure")}
     u = reference.displacement(at.points)

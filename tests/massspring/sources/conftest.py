@@ -34,7 +34,7 @@ def checkout(tmp_path, monkeypatch):
 
 def fresh(*modules: str, **within) -> str:
     """As another process would find it."""
-    for function in (source_fingerprint, sources._followed, sources._source, sources._remembered):
+    for function in (source_fingerprint, sources._followed, sources._source, sources._memory):
         function.cache_clear()
     return source_fingerprint(*modules, **within)
 
@@ -42,5 +42,5 @@ def fresh(*modules: str, **within) -> str:
 @pytest.fixture(autouse=True)
 def forget():
     yield
-    for function in (source_fingerprint, sources._followed, sources._source, sources._remembered):
+    for function in (source_fingerprint, sources._followed, sources._source, sources._memory):
         function.cache_clear()

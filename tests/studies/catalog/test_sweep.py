@@ -101,7 +101,7 @@ def test_only_what_the_filter_lets_through(results):
     write_record(path, replace(read_record(path), status=Status.TIMED_OUT))
     timed.timing_file(results, "tiny", tiny_case(timed=True)).unlink()
     watched = Silent()
-    assert run_studies(results, [study], 1, watched, wanted=partial(failed, Ledger(results))) == 1
+    assert run_studies(results, [study], 1, watched, selection=partial(failed, Ledger(results))) == 1
     assert watched.done == [("physics", diverging_case().name)]
     assert counts(results, study) == {"ok": 1, "stale": 1, "diverged": 1}
 

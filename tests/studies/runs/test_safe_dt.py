@@ -28,14 +28,14 @@ def recipe_for(method):
 def test_below_holds_and_above_breaks(method):
     step = safe_step(Case(SHORT, recipe_for(method), method()))
     if method is XpbdNeoHookean:  # its springs are replaced by constraints: nothing tried broke it
-        assert {status for _, status in step.tried} == {Status.OK} and step.tried[-1][0] > 2 * step.limit.damped
+        assert {status for _, status in step.trials} == {Status.OK} and step.trials[-1][0] > 2 * step.limit.damped
         return
     if method is Xpbd:
         # The volumes of all cells take the stiffest modes away: the limit is longer than that of the springs.
-        assert step.bracket is not None and step.limit.damped < step.bracket[1] and step.tried[0][1] == Status.OK
+        assert step.bracket is not None and step.limit.damped < step.bracket[1] and step.trials[0][1] == Status.OK
         return
     assert step.verified
-    (below, calm), (above, wild) = step.tried
+    (below, calm), (above, wild) = step.trials
     # Rounding to whole steps, a hundred to a frame, moves the step by 1 % at most, and never up.
     assert 0.99 * BELOW <= below / step.limit.damped <= BELOW * (1 + 1e-9)
     assert 0.99 * ABOVE <= above / step.limit.damped <= ABOVE * (1 + 1e-9)
@@ -48,8 +48,8 @@ def test_a_method_without_a_limit_says_so(method):
     """Twenty times the explicit limit, and the run holds; a claim that fails is not verified."""
     step = safe_step(Case(SHORT, recipe_for(method), method()))
     assert step.verified and "no stability limit" in step.verdict and "accuracy" in step.verdict
-    assert step.tried[-1][0] > 15 * step.limit.damped
-    assert not replace(step, tried=((0.1, Status.DIVERGED),)).verified
+    assert step.trials[-1][0] > 15 * step.limit.damped
+    assert not replace(step, trials=((0.1, Status.DIVERGED),)).verified
 
 
 def test_stiffer_means_shorter():

@@ -81,15 +81,15 @@ def test_what_no_option_repairs_and_what_is_large_is_not_tried(tmp_path, monkeyp
     monkeypatch.setattr(advice, "scan", lambda *words, **how: calls.append(how))
     large = Source(stored(tmp_path / "large.ply", POINTS, FACES[3:]), "mm")
     monkeypatch.setattr(advice, "MOST", 100)
-    checked = advice.tried(large, examine(large))
+    checked = advice.with_command(large, examine(large))
     assert checked.command is None
     assert checked.findings[0].mend.startswith("try organbench mesh --from FILE --close-holes")
     nan = POINTS.copy()
     nan[0] = np.nan
     bad = Source(stored(tmp_path / "nan.ply", nan, FACES), "mm")
-    assert advice.tried(bad, examine(bad)).command is None
+    assert advice.with_command(bad, examine(bad)).command is None
     sound = Source(stored(tmp_path / "sound.ply", POINTS, FACES))
-    assert advice.tried(sound, examine(sound)) == examine(sound)  # its unit alone is a question
+    assert advice.with_command(sound, examine(sound)) == examine(sound)  # its unit alone is a question
     assert not calls
 
 
@@ -120,7 +120,7 @@ def test_what_is_left_is_named(monkeypatch, tmp_path):
     source = Source(stored(tmp_path / "open.ply", POINTS, FACES[3:]), "mm")
     ring = examine(source)
     monkeypatch.setattr(advice, "examined", lambda source, how: None if "solid" in how else ring)
-    (finding,) = advice.tried(source, ring).findings
+    (finding,) = advice.with_command(source, ring).findings
     assert finding.mend.endswith("; --nodes 550 --close-holes makes a body, in which this is left: open")
 
 
@@ -128,7 +128,7 @@ def test_a_file_of_no_organs_size_is_not_meshed(monkeypatch, tmp_path):
     """Its unit is missing: 2 m is no organ's length in m, cm or mm."""
     monkeypatch.setattr(advice, "scan", lambda *words, **how: pytest.fail("meshed"))
     source = Source(stored(tmp_path / "large.ply", POINTS / 30.5, FACES[3:]))
-    findings = advice.tried(source, examine(source)).findings
+    findings = advice.with_command(source, examine(source)).findings
     assert "an organ's in no unit we know" in findings[0].sentence and findings[1].mend.startswith("try ")
 
 

@@ -37,7 +37,7 @@ def test_an_extra_adds_to_what_is_required():
 def test_a_package_that_is_missing_or_too_old_is_named_with_the_line_that_installs_it():
     finding = software.packages([Requirement("not-there>=2"), Requirement("numpy>=999"), Requirement("scipy>=1")])
     assert finding.level is Level.FAULT
-    assert "not-there is not installed, numpy is " in finding.said and "but >=999 is required" in finding.said
+    assert "not-there is not installed, numpy is " in finding.sentence and "but >=999 is required" in finding.sentence
     assert finding.mend == f"{sys.executable} -m pip install 'not-there>=2' 'numpy>=999'"
 
 
@@ -69,7 +69,7 @@ def broken(tmp_path, monkeypatch):
 def test_a_missing_system_library_is_named_with_the_packages_of_debian(broken):
     broken("raise OSError('libGLU.so.1: cannot open shared object file: No such file or directory')")
     finding = software.loads("gmsh")
-    assert finding.level is Level.FAULT and "libGLU.so.1" in finding.said
+    assert finding.level is Level.FAULT and "libGLU.so.1" in finding.sentence
     assert "libglu1-mesa" in finding.mend and (shutil.which("apt-get") is None or "apt-get install -y" in finding.mend)
 
 
@@ -106,7 +106,7 @@ def test_a_cache_that_cannot_be_written_to(tmp_path, monkeypatch):
 def test_a_disk_without_room(tmp_path, monkeypatch):
     monkeypatch.setattr(machine_checks.shutil, "disk_usage", lambda folder: SPACE(10**12, 10**12, 5 * 10**8))
     finding = machine_checks.room("results", tmp_path / "not" / "yet")
-    assert finding.level is Level.FAULT and "0.5 GB free" in finding.said and str(tmp_path) in finding.mend
+    assert finding.level is Level.FAULT and "0.5 GB free" in finding.sentence and str(tmp_path) in finding.mend
 
 
 def test_little_memory_one_core_and_no_compiler(monkeypatch):
@@ -127,15 +127,15 @@ def test_a_results_folder_that_is_not_there_or_is_a_file(tmp_path):
 @pytest.mark.slow
 def test_results_that_are_damaged_or_of_another_version(results):
     (good,) = results_folder(results, ["tiny"])
-    assert good.level is Level.OK and good.said.startswith("5 results files of schema 2")
+    assert good.level is Level.OK and good.sentence.startswith("5 results files of schema 2")
     path = case_path(results, "tiny", tiny_case())
     path.write_bytes(path.read_bytes()[:-100])
     (results / "old").mkdir()
     (results / "old" / "case.h5").write_bytes(b"\x89HDF\r\n\x1a\n" + bytes(600))
     good, other, bad = results_folder(results, ["tiny"])
-    assert good.said.startswith("4 results files")
+    assert good.sentence.startswith("4 results files")
     assert other.level is Level.NOTE and other.mend == f"rm {results / 'old' / 'case.h5'}"
-    assert bad.level is Level.FAULT and path.name in bad.said
+    assert bad.level is Level.FAULT and path.name in bad.sentence
     assert bad.mend == f"organbench run tiny --only stale --results {results}"
 
 
