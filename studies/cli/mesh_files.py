@@ -34,7 +34,7 @@ def source_of(path: Path, unit: str | None, scale: float, longest_side: str | No
 
 
 def settled(source: Source, yes: bool) -> Source:
-    """The file once it may be read and its unit is known: asks at the terminal, or raises StudyError."""
+    """The file with its unit, once it may be read: asks at the terminal, or raises StudyError."""
     ask_before_large(source.path, yes)
     return with_unit(source)
 

@@ -1,4 +1,4 @@
-"""What words on the command line mean: a case, and bounds as people type them (3% or 0.03, 1ms or 250us)."""
+"""Words on the command line as values: a case, and bounds as people type them (3% or 0.03, 1ms or 250us)."""
 
 import re
 from typing import Annotated

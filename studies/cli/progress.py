@@ -43,7 +43,7 @@ class TerminalProgress:
         self.pending = {(piece.stage, piece.label): piece for piece in planned}
         self.jobs = jobs
         self.done: Counter[str] = Counter()
-        """What is done, by kind."""
+        """Number of finished pieces, by kind."""
         self.compiled: set[str] = set()
         self.last_report = time.monotonic()
         self.last_compile_report = 0.0
@@ -149,7 +149,7 @@ def basis(planned: list[Planned]) -> str:
 
 
 def disk(planned: list[Planned], root: Path) -> str:
-    """What pieces will store, and what the disk has left."""
+    """The size of what pieces will store, and the free space of the disk."""
     stored, unknown = expected_bytes(planned)
     free = free_bytes(root)
     more = f" (without {amounts(Counter({'reference': unknown}))} of unknown size)" if unknown else ""

@@ -1,4 +1,4 @@
-"""What all commands share: where they print, and the words for results and studies."""
+"""Shared by all commands: where they print, and the options for results and studies."""
 
 import unicodedata
 from collections.abc import Iterable

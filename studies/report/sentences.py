@@ -80,7 +80,7 @@ def table(published: Path, study: str, name: str = "") -> list[Row]:
 
 
 def column(rows: Iterable[Row], name: str) -> list[float]:
-    """The known values of a column."""
+    """The values of a column without NaN."""
     return [float(row[name]) for row in rows if row[name] == row[name]]
 
 

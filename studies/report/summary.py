@@ -1,5 +1,5 @@
-"""Tables for people to read, in Markdown: what `make study` found, which body is recommended, and what each rung of the
-ladder of bodies is worth."""
+"""Tables for people to read, in Markdown: the results of `make study`, the recommended bodies, and the accuracy of
+each rung of the ladder of bodies."""
 
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass
@@ -96,7 +96,7 @@ class Choice(NamedTuple):
 
 
 def choice_of(scene: Scene, bodies: Sequence[Judged]) -> Choice | None:
-    """The choice among the bodies of a scene; None where no error is known of any that may be recommended."""
+    """The choice among the bodies of a scene; None where no body that may be recommended has an error."""
     wish = usual_wish(scene)
     best = cheapest(bodies, wish)
     chosen = best or nearest(bodies, wish)
@@ -104,8 +104,8 @@ def choice_of(scene: Scene, bodies: Sequence[Judged]) -> Choice | None:
 
 
 def compared_bodies(runs: Sequence[Run]) -> dict[str, list[Judged]]:
-    """Name of a scene -> its runs that ended well and of which an error is known, in their order, the neighbouring
-    meshes of a recipe as one."""
+    """Name of a scene -> its runs that ended well and have an error, in their order, with the neighbouring meshes
+    of a recipe as one."""
     scenes: dict[str, list[Judged]] = {}
     for one in map(judged, runs):
         if one is not None and one.compared:

@@ -138,7 +138,7 @@ def glance(path: Path, attributes: Collection[str]) -> Record:
 
 def canonical(key: str) -> str:
     """The JSON text of a case with sorted names and no blanks, so that equal cases are equal text: also where a file
-    that is known by its "sha256" has another "path"."""
+    of the same "sha256" has another "path"."""
     try:
         hook = _without_path if '"sha256"' in key else None
         return json.dumps(json.loads(key, object_hook=hook), sort_keys=True, separators=(",", ":"))

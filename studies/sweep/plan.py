@@ -32,7 +32,7 @@ class Planned:
     label: str
     why: str
     seconds: float | None
-    """What it took when it last ran [s], without compiling; None where nothing is stored."""
+    """Duration of its last run [s], without compiling; None where nothing is stored."""
     size: int | None = None
     """Bytes that it will store: as then, else from what a case records; None of a reference that is not stored."""
     guess: float = 0.0
@@ -109,8 +109,8 @@ def expected(pieces: Sequence[Planned], jobs: int) -> float:
 
 
 def expected_bytes(pieces: Sequence[Planned]) -> tuple[int, int]:
-    """What `pieces` will store, and how many of them are not counted, because their size is unknown. A reference
-    counts as the mean of those of known size."""
+    """The size of what `pieces` will store, and how many of them are not counted, because their size is unknown. A
+    reference counts as the mean of those of known size."""
     sizes = [piece.size for piece in pieces if piece.size is not None]
     references = [piece.size for piece in pieces if piece.kind == "reference" and piece.size is not None]
     unknown = len(pieces) - len(sizes)

@@ -32,7 +32,7 @@ CAMPAIGNS: Mapping[str, tuple[Callable[[int, int], Any], Attempt]] = {
     REFERENCE: (draw_reference, try_reference),
     CUTS: (draw_cut, try_cut),
 }
-"""Of each, by the folder of its results: how a trial is drawn and tried."""
+"""How each campaign draws and runs a trial, by the folder of its results."""
 
 
 def fuzz(

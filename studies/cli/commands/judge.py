@@ -82,7 +82,7 @@ def reference_of(results: Path, scene: Scene) -> Reference | None:
 
 
 def hints_of(run: Run) -> list[str]:
-    """What is probably a mistake though it can be judged."""
+    """Warnings of probable mistakes in a result that can be judged."""
     hints = [text] if (text := str(run.record.attributes["warnings"])) else []
     error = FORCE(run)
     if error < REVERSED:
@@ -94,7 +94,7 @@ def hints_of(run: Run) -> list[str]:
 
 
 def lines_of(run: Run) -> list[str]:
-    """Each metric with its value and how well it is known."""
+    """Each metric with its value and uncertainty."""
     lines, marked = [], False
     for metric in judged_metrics(run.case.scene):
         value = metric(run)

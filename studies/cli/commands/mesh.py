@@ -85,7 +85,7 @@ def mesh(
 
 
 class Made(NamedTuple):
-    """A mesh, and the same with curved sides where they were asked for."""
+    """A mesh, and the same with curved sides where an option requests them."""
 
     mesh: OrganMesh
     curved: CurvedMesh | None
@@ -100,7 +100,7 @@ def following(mesh: OrganMesh, shape: Shape | None) -> CurvedMesh:
 
 
 def check_one(name: str, source: Path | None, seed: int | None) -> None:
-    """Raise StudyError unless an organ or a file is asked for, and no file with a seed."""
+    """Raise StudyError unless an organ or a file is given, and no file with a seed."""
     if bool(name) == (source is not None):
         raise StudyError("name what to mesh: an organ (see `organbench list`), or --from FILE")
     if source is not None and seed is not None:
@@ -108,7 +108,7 @@ def check_one(name: str, source: Path | None, seed: int | None) -> None:
 
 
 def check_filling(output: Path, fill: bool | None, order: int) -> bool:
-    """Whether the body gets tetrahedra: as asked, or as its file can hold them. Raises StudyError where it cannot."""
+    """Whether the body gets tetrahedra: by the option, or by the file format. Raises StudyError where it cannot."""
     filled = holds_tetrahedra(output) if fill is None else fill
     if filled and not holds_tetrahedra(output):
         raise StudyError(f"{output.name}: {output.suffix} holds triangles only; use .vtu, or leave out --fill")
@@ -151,7 +151,7 @@ def closeness(made: Made, truth: Organ, make: Callable[[int | None], Made]) -> s
     if not errors.worst > 1.0:
         return sentence
     with working("looking for the number of nodes that keeps the shape"), warnings.catch_warnings():
-        warnings.simplefilter("ignore", UserWarning)  # of meshes that nobody asked for
+        warnings.simplefilter("ignore", UserWarning)  # of meshes that are not the output
         for _ in range(TRIES):
             count = 10 * int(np.ceil(0.1 * count * min(max(LEAST, SAFETY * errors.worst), MOST)))
             try:
@@ -205,7 +205,7 @@ def nearness(made: OrganMesh) -> list[str]:
 
 
 def summary(made: Made) -> str:
-    """What was made, in a line."""
+    """A line that describes the mesh."""
     mesh, smooth = made
     body = f", {len(mesh.tetrahedra):,} tetrahedra" if len(mesh.tetrahedra) else ""
     angle = f"{float(np.min(dihedral_angles(mesh.points, mesh.tetrahedra))):.3g}" if body else ""

@@ -91,7 +91,7 @@ def tissue_of(given: str | None, path: Path, part: str | None) -> str:
 
 
 def answer_for(source: Source, placing: Proposal, tissue: str) -> Advice | None:
-    """What `organbench advise` recommends for the scene by the published table; None, with a warning, where there is no
+    """The answer of `organbench advise` for the scene by the published table; None, with a warning, where there is no
     such table."""
     scene = placed_scene(python_name(stem_of(source.path)), source, placing, TISSUES[tissue])
     try:
@@ -115,7 +115,7 @@ def second_body(answer: Advice | None) -> Recommended | None:
 
 
 def minutes(answer: Advice | None) -> float:
-    """What the study takes on one core, roughly and without compiling: meshes, references, and the recommended body."""
+    """Minutes of the study on one core, roughly and without compiling: meshes, references, the recommended body."""
     body = 0.0
     if answer is not None and answer.chosen is not None and answer.chosen.cost.known:
         body = answer.chosen.cost.value * answer.scene.duration

@@ -143,7 +143,7 @@ def _index(path: Path, links: dict[str, str], every: bool) -> Tree:
 
 
 def _entries(path: Path) -> dict[str, Entry]:
-    """What is known of the files next to a study's index; nothing where it does not lie in a results folder."""
+    """The ledger's entries for files next to a study's index; none where the index lies in no results folder."""
     folder = path.absolute().parent
     return Ledger(folder.parent).files(folder.name) if folder.name == path.stem else {}
 

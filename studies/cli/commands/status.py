@@ -50,7 +50,7 @@ def status(
 
 
 def show_reasons(job_standings: list[Standing], every: bool) -> None:
-    """What is not ok: each reason once, and under it the cases and reference solutions."""
+    """Results that are not ok: each reason once, and under it the cases and reference solutions."""
     reasons: dict[tuple[str, str], list[str]] = {}
     for standing in job_standings:
         if standing.status != "ok":

@@ -14,7 +14,7 @@ EXTRA = ("distributed", "dask", "dask_jobqueue", "yaml", "psutil")
 """What the extra `cluster` installs."""
 NEEDED = "needs the extra `cluster`, which is not installed: pip install 'organbench[cluster]'"
 NO_WORKER_SECONDS = 60.0
-"""That a cluster which is there may be without a worker."""
+"""Time that a running cluster may be without a worker."""
 WORDS = "local:N, an address as tcp://HOST:8786, or a FILE.yaml"
 
 

@@ -52,7 +52,7 @@ class Session:
         self.submitted = 0
 
     def workers(self) -> dict[str, Any]:
-        """All that the scheduler knows now, by address. Raises StudyError when it is gone."""
+        """All workers of the scheduler now, by address. Raises StudyError when it is gone."""
         if self.client.status != "running":
             raise StudyError(GONE)
         try:

@@ -81,7 +81,7 @@ class Settings:
     command: str = ""
     """Of kind "command": a line of shell; {scheduler_file}, {processes} and {memory} stand for what a worker needs."""
     host: str = ""
-    """Name or number under which workers reach this machine; empty: found."""
+    """Name or number under which workers reach this machine; empty: determined here."""
     wait_hours: Annotated[float, Field(gt=0)] = 24.0
     """For the first worker, and whenever there is none."""
     portable: bool = False
@@ -161,7 +161,7 @@ def cluster_of(settings: Settings, folder: Path) -> SpecCluster:
 
 
 def _words(settings: Settings, folder: Path) -> dict[str, Any]:
-    """What dask-jobqueue is called with."""
+    """Arguments of dask-jobqueue."""
     memory = settings.memory_gb or MEMORY_GB * settings.processes
     words: dict[str, Any] = {
         "cores": settings.processes,

@@ -8,7 +8,7 @@ from studies.base.errors import StudyError
 CERTIFICATE, KEY = "certificate.pem", "key.pem"
 """Next to scheduler.json, in a folder that its owner alone may enter."""
 DAYS = 365
-"""That a key is good for; its folder's command ends earlier."""
+"""Lifetime of a key; the command that owns its folder ends earlier."""
 OPENSSL_SECONDS = 60.0
 
 

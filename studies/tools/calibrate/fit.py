@@ -68,7 +68,7 @@ def fit(start: BodyRecipe, scenes: Sequence[Scene], measure: Measure) -> Fit:
 
 
 def _residuals(recipe: BodyRecipe, scenes: Sequence[Scene], measure: Measure) -> list[float]:
-    """Every known error over its goal; none at all where a run ended badly."""
+    """Every error over its goal; none at all where a run ended badly."""
     residuals: list[float] = []
     for scene in scenes:
         errors, wish = measure(scene, recipe), usual_wish(scene)
