@@ -14,8 +14,8 @@ from studies.scene.scene import Scene
 POPULATION = "population"
 """The study that `organbench run population` brings up to date."""
 MEMBERS = (
-    Population("liver", 76),
-    Population("kidney", 76),
+    Population("liver", 100),
+    Population("kidney", 100),
     Population("stomach", 50),
     Population("spleen", 30),
     Population("bladder", 30),
