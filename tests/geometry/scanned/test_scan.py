@@ -100,7 +100,7 @@ def test_without_nodes_the_triangles_stay(block):
         scan(path, unit="mm", smooth=0.002)
 
 
-def test_warnings_name_every_change_to_a_surface(block, tmp_path):
+def test_warnings_name_flipped_triangles_and_parts_that_are_left_out(block, tmp_path):
     _, points, faces = block
     speck = box((90, 90, 90), (95, 95, 95))
     both = together((points, faces[:, ::-1]), speck)

@@ -108,7 +108,8 @@ def test_a_stub_leads_to_the_code_behind_a_name(checkout):
         fresh("studies.user")
 
 
-def test_the_state_of_all_code_is_known():
+def test_all_code_can_be_read():
+    """It raises for a name whose module cannot be determined."""
     assert len(source_fingerprint(*sources.own_modules())) == 64
 
 

@@ -118,7 +118,7 @@ def test_both_solvers_see_the_same_obstacles(judged):
 
 def test_both_solvers_hold_the_same_region(judged):
     if judged.symmetric or not judged.held:
-        return
+        pytest.skip("an octant is held by its symmetry" if judged.symmetric else "it holds nothing")
     problem = small_problem(judged)
     mesh, level = mesh_for(judged, few(judged), on_shape=True), few(judged)
     while (

@@ -64,7 +64,7 @@ def test_judged_errors_are_those_of_the_fitted_body(made):
         body = replace(BODY, stiffness=trial.parameters["stiffness"])
         assert judged.scene == scene.name and judged.force.after == runs.errors(scene, body).force.value
     assert runs.made == 0
-    assert outcome.verdict in Verdict and {trial.displacement for trial in outcome.trials} == {None}
+    assert {trial.displacement for trial in outcome.trials} == {None}
 
 
 @pytest.mark.slow
