@@ -35,6 +35,11 @@ for an organ that hangs. Most of the difference is the error of the coarser mesh
 hangs both have the same error."""
 
 
+FEW_FACETS = "facets will touch the probe"
+"""In the warning before the run (studies.meshing.kept_shape). The force of few facets points off on both meshes, and
+turns the organ: liver_0_086, 17 facets, 1.8 % off while two meshes agree."""
+
+
 class Apart(NamedTuple):
     """Difference of two bodies in one scene at its last checkpoint; NaN if the scene does not allow the comparison."""
 
@@ -108,7 +113,7 @@ def judgements(runs: Sequence[Run]) -> list[Judgement]:
         right = [value <= bound for value, bound in values if value == value]
         if not right:  # no error is known
             continue
-        trusted = not doubt(coarse.case, fine.case) and within(between, wish, allowed_share(scene))
+        trusted = not doubt_of(coarse, fine) and within(between, wish, allowed_share(scene))
         alike = within(between, wish, 1.0)
         judged.append(Judgement(scene.name, fine.case.body.nodes, between, alike, trusted, all(right)))
     return judged
@@ -161,12 +166,18 @@ def _verdict(scene: str, coarse: Run, fine: Run) -> Verdict:
         for name, value in (("force", between.force), ("displacement", between.displacement))
         if value == value
     ]
-    facets, share, reason = contact_facets(fine), allowed_share(fine.case.scene), doubt(coarse.case, fine.case)
+    facets, share, reason = contact_facets(fine), allowed_share(fine.case.scene), doubt_of(coarse, fine)
     few = f"; {facets:.0f} facets touch" if facets == facets else ""
     why = f"two meshes ({nodes}) differ by {' and '.join(parts)}{few}"
     if reason:
         return Verdict(scene, False, f"{reason}; {why}")
     return Verdict(scene, within(between, wish, share), f"{why}; allowed: {share:g} times the target")
+
+
+def doubt_of(coarse: Run, fine: Run) -> str:
+    """The same of two runs: the finer one is not trusted either if too few facets touch its probe."""
+    few = FEW_FACETS in str(fine.record.attributes.get("warnings", ""))
+    return doubt(coarse.case, fine.case) or ("too few facets touch the probe" if few else "")
 
 
 def doubt(coarse: Case, fine: Case) -> str:

@@ -9,9 +9,11 @@ import pytest
 from studies.catalog.of_scene import study_of
 from studies.cli.commands.run import _say_trust
 from studies.geometry import HalfSpace
-from studies.metrics.trust import Apart, apart, doubt, verdicts, within
+from studies.meshing.kept_shape import tell_shape
+from studies.metrics.trust import FEW_FACETS, Apart, apart, doubt, verdicts, within
 from studies.metrics.wish import Wish
 from studies.runs.case import BodyRecipe
+from studies.runs.prepare import mesh_of
 from studies.scene.cut import Cut
 from studies.scene.library.liver_probe import LIVER_PROBE
 from studies.scene.library.spleen_sag import SPLEEN_SAG
@@ -99,6 +101,22 @@ def test_what_was_not_measured_is_not_trusted_even_where_two_meshes_agree(scene,
 def test_the_study_of_a_scene_takes_the_nodes_that_its_warning_needs(scene):
     bodies = [case for case in study_of(scene).cases if case.body.graded == "adaptive"]
     assert [case.body.nodes for case in bodies] == [1194, 1594] and not doubt(*bodies)
+
+
+def test_a_body_that_warns_of_few_facets_is_not_trusted_however_near_two_meshes_are():
+    """The words are those of the warning before the run."""
+    with pytest.warns(UserWarning, match=FEW_FACETS) as records:
+        tell_shape(LIVER_PROBE, mesh_of(LIVER_PROBE, BodyRecipe("quadratic", 394)), filled=True)
+    (warning,) = [text for record in records if FEW_FACETS in (text := str(record.message))]
+    fine = body_run(FINE)
+    attributes = {**fine.record.attributes, "warnings": warning}
+    warned = replace(fine, record=replace(fine.record, attributes=attributes))
+    (trusted,) = verdicts([body_run(COARSE), fine])
+    (doubted,) = verdicts([body_run(COARSE), warned])
+    assert trusted.trusted and not doubted.trusted
+    assert doubted.why.startswith("too few facets touch the probe; two meshes")
+    other = replace(body_run(COARSE), record=replace(body_run(COARSE).record, attributes=attributes))
+    assert verdicts([other, fine])[0].trusted, "the coarser one is not in question"
 
 
 def test_where_there_is_a_reference_it_judges():
