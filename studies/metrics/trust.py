@@ -174,12 +174,6 @@ def _verdict(scene: str, coarse: Run, fine: Run) -> Verdict:
     return Verdict(scene, within(between, wish, share), f"{why}; allowed: {share:g} times the target")
 
 
-def doubt_of(coarse: Run, fine: Run) -> str:
-    """The same of two runs: the finer one is not trusted either if too few facets touch its probe."""
-    few = FEW_FACETS in str(fine.record.attributes.get("warnings", ""))
-    return doubt(coarse.case, fine.case) or ("too few facets touch the probe" if few else "")
-
-
 def doubt(coarse: Case, fine: Case) -> str:
     """Why the finer of two bodies of a scene is not trusted even if they agree; empty for the kinds that were measured:
     adaptive bodies with ENOUGH nodes, compared with one of at most COARSER_SHARE of them, in scenes without cuts
@@ -191,6 +185,12 @@ def doubt(coarse: Case, fine: Case) -> str:
     if fine.body.graded != ADAPTIVE:
         return "the rule is measured for adaptive bodies alone"
     return "the rule is not measured for scenes with cuts" if fine.scene.cuts else ""
+
+
+def doubt_of(coarse: Run, fine: Run) -> str:
+    """Why the finer of two runs is not trusted even if they agree: `doubt`, or few facets under its probe."""
+    few = FEW_FACETS in str(fine.record.attributes.get("warnings", ""))
+    return doubt(coarse.case, fine.case) or ("too few facets touch the probe" if few else "")
 
 
 def allowed_share(scene: Scene) -> float:
