@@ -2,6 +2,7 @@
 
 import zlib
 from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 
@@ -166,19 +167,22 @@ def _able(shape: Shape, point: PalpationPoint, radius: float, depth: float) -> b
         return False
     if shape.level((at - 3.0 * depth * outward)[None])[0] >= 0.0:
         return False
-    end = at + (radius - depth) * outward + radius * _directions(4000)
-    beyond = end[(end - at) @ outward < -depth / 2.0]  # not the air from which the probe comes
-    if any(((region.level(beyond) <= 0.0) & (shape.level(beyond) > 0.0)).any() for region in shape.regions.values()):
-        return False
     across = np.linalg.svd(outward[None])[2][1:]
     turns = np.linspace(0.0, 2.0 * np.pi, 12, endpoint=False)
     circle = np.cos(turns)[:, None] * across[0] + np.sin(turns)[:, None] * across[1]
     if any((region.level(at + radius * circle) <= 0.0).any() for region in shape.regions.values()):
         return False
     touched = np.sqrt(radius * depth)  # on a soft half space (Hertz)
-    return float(np.linalg.norm(normals(shape, at + touched * circle).mean(axis=0))) > FLAT
+    if np.linalg.norm(normals(shape, at + touched * circle).mean(axis=0)) <= FLAT:
+        return False
+    end = at + (radius - depth) * outward + radius * _directions(4000)
+    beyond = end[(end - at) @ outward < -depth / 2.0]  # not the air from which the probe comes
+    return not any(
+        ((region.level(beyond) <= 0.0) & (shape.level(beyond) > 0.0)).any() for region in shape.regions.values()
+    )
 
 
+@cache
 def _directions(count: int = 400) -> np.ndarray:
     """Unit vectors spread over the sphere, (count, 3) (Fibonacci lattice)."""
     heights = 1.0 - (2.0 * np.arange(count) + 1.0) / count
