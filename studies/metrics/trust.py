@@ -36,8 +36,8 @@ hangs both have the same error."""
 
 
 FEW_FACETS = "facets will touch the probe"
-"""In the warning before the run (studies.meshing.kept_shape). The force of few facets points off on both meshes, and
-turns the organ: liver_0_086, 17 facets, 1.8 % off while two meshes agree."""
+"""Part of a warning before the run (studies.meshing.kept_shape). With few facets the contact force has the wrong
+direction on both meshes and turns the organ: two meshes of liver_0_086 agree, and with 17 facets it is 1.8 % off."""
 
 
 class Apart(NamedTuple):

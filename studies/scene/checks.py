@@ -35,9 +35,9 @@ LARGE = 10.0
 """Factor on the size of the body beyond which a length is an error."""
 AXIS_POINTS = 9
 SIDES = ((0, 1), (1, 2), (2, 0), (0, 1, 2))
-"""Corners of a triangle between which a surface is sampled once more."""
+"""Corners of a triangle whose mean is one more sample of the surface: its edges and its middle."""
 PATH_TIMES = 41
-"""At which the distance of an obstacle to what is held is measured, besides those of the path itself."""
+"""Number of times at which the depth of an obstacle in a held region is measured, in addition to those of the paths."""
 
 
 def check_scene(scene: Scene) -> list[str]:
@@ -173,8 +173,8 @@ def _pressed_through(scene: Scene, number: int, points: np.ndarray) -> list[str]
 
 
 def _pressed_into_held(scene: Scene, number: int, samples: np.ndarray, size: float) -> list[str]:
-    """An obstacle that goes into a held region, whose nodes cannot get out of its way. As deep as seen at `samples` of
-    the surface (n, 3) [m], which may miss a fraction of their spacing."""
+    """A warning for an obstacle that moves into a held region, whose nodes cannot move out of its way. The depth is
+    measured at `samples` of the surface (n, 3) [m]; between them it may be larger."""
     obstacle, warned = scene.obstacles[number], []
     for held in scene.held:
         nodes = samples[held.region.level(samples) <= 0.0]

@@ -159,8 +159,8 @@ def _rounded(vector: Vector) -> Vector:
 
 def _able(shape: Shape, point: PalpationPoint, radius: float, depth: float) -> bool:
     """Whether a probe of `radius` can be pushed in by `depth` there: it starts clear of the organ, touches a patch
-    that is nearly flat, far from what is held, with three times the depth of organ behind it, and where it ends nothing
-    is held."""
+    that is nearly flat, far from what is held, with three times the depth of organ behind it, and nothing is held
+    where it ends."""
     at, outward = np.asarray(point.point), np.asarray(point.normal)
     ball = at + (radius + GAP) * outward + radius * _directions()
     if (shape.level(ball) <= 0.0).any():

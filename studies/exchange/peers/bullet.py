@@ -108,7 +108,7 @@ class Deformable:
 
     def force(self, t: float) -> float:
         """The probed force [N] at time t [s]: what the elements push back at the held region, or at all free nodes that
-        are nearer to the asked obstacle than to any other. At rest only touched nodes push."""
+        are nearer to the probed obstacle than to any other. At rest only touched nodes push."""
         x, nodes = self.positions(), self.scene.probed_nodes
         if self.probed is not None:
             nearest = np.argmin([gap(one, x, t)[0] for one in self.obstacles], axis=0)
