@@ -15,7 +15,7 @@ from studies.geometry.surface.family import true_volume
 from studies.reference.solve import VARIANTS
 from studies.report.publish import PUBLISHED
 from studies.report.sentences import APART, NODAL, SENTENCES, TOGETHER, random_organs, real_time
-from studies.report.summary import SUMMARIES
+from studies.report.summaries import SUMMARIES
 from studies.scene.library import BALL_SQUEEZE, LIVER_PRESS
 from studies.scene.library.ball_squeeze import RADIUS
 

@@ -28,10 +28,11 @@ from studies.report.published_code import (
     scenes_code,
     studies_code,
     study_code,
+    text_code,
 )
 from studies.report.results import FIGURES, charts_and_tables, refresh
 from studies.report.sentences import SENTENCES
-from studies.report.summary import SUMMARIES
+from studies.report.summaries import SUMMARIES
 from studies.store.ledger import Ledger
 from studies.store.machine import machine_id, machine_of, write_machine
 from studies.store.record import peek
@@ -176,8 +177,8 @@ def _codes(studies: Sequence[Study], extras: Sequence[str], whole: bool = True) 
     """Name of what is published -> the hash of the present code for it (studies.report.published_code); whole: also
     that of the tables over all `studies`."""
     codes: dict[str, Callable[[], str]] = {study.name: partial(study_code, study) for study in studies}
-    alone = [summary for summary in SUMMARIES if "/" not in summary.file]  # others lie in the folder of a study
-    codes |= {summary.file: codes[summary.study] for summary in alone if summary.study in codes}
+    by_name = {study.name: study for study in studies}
+    codes |= {one.file: partial(text_code, by_name[one.study], one.text) for one in SUMMARIES if one.study in by_name}
     codes |= {name: partial(source_fingerprint, *EXTRAS[name].makers) for name in extras}
     if whole:
         codes[REFERENCES] = partial(scenes_code, studies, "studies.report.references")

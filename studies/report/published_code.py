@@ -13,6 +13,7 @@ from studies.base.errors import StudyError
 from studies.catalog.study import Study
 from studies.metrics.table import metric
 from studies.reference.published import fingerprint_of
+from studies.runs.case import Case
 from studies.runs.current import case_fingerprint
 from studies.runs.user_code import file_of
 
@@ -35,13 +36,18 @@ class Finding:
 def study_code(study: Study) -> str:
     """Hash of what the tables and charts of a study are made by and of: its cases, the code that runs, judges, measures
     and draws them, and their references."""
-    parts = [text for case in study.cases for text in (case.key, case_fingerprint(case))]
+    parts = [text for case in study.cases for text in (_key(case), case_fingerprint(case))]
     parts += [fingerprint_of(scene) for scene in study.scenes]
     drawings = [chart.drawing for chart in study.charts] + [metric(column).of for column in study.columns]
     parts += [file.sha256 for file in map(file_of, drawings) if file is not None]
     modules = {drawing.partition(":")[0] for drawing in drawings if isinstance(drawing, str)}
     parts.append(source_fingerprint("studies.metrics.table", *sorted(modules)))
     return _digest([*parts, *(metric(column).name for column in study.columns)])
+
+
+def text_code(study: Study, text: Callable) -> str:
+    """The same of a text for people that the function `text` reads off the runs of `study`."""
+    return _digest([source_fingerprint(text.__module__), study_code(study)])
 
 
 def scenes_code(studies: Sequence[Study], module: str) -> str:
@@ -53,6 +59,21 @@ def scenes_code(studies: Sequence[Study], module: str) -> str:
 def studies_code(studies: Sequence[Study], module: str) -> str:
     """The same of a table over the runs of all `studies`."""
     return _digest([source_fingerprint(module), *map(study_code, studies)])
+
+
+def _key(case: Case) -> str:
+    """The key of a case, its vectors to six decimals (a micrometre): the place of a probe on a random organ is computed
+    from the surface, and its last bits depend on the processor."""
+    return json.dumps(_rounded(json.loads(case.key)), sort_keys=True, ensure_ascii=False)
+
+
+def _rounded(value: object) -> object:
+    if isinstance(value, dict):
+        return {key: _rounded(inner) for key, inner in value.items()}
+    if isinstance(value, list):
+        vector = len(value) == 3 and all(isinstance(inner, float) for inner in value)
+        return [round(inner, 6) + 0.0 if vector else _rounded(inner) for inner in value]  # 0.0 turns -0.0 into 0.0
+    return value
 
 
 def _digest(parts: Iterable[str]) -> str:

@@ -18,7 +18,7 @@ from studies.base.errors import StudyError
 from studies.catalog import STUDIES, Study
 from studies.report.publish import APART, EXTRAS, KEPT, LEAGUE, PUBLISHED, REFERENCES, SWEEP, is_current
 from studies.report.published_code import FILE
-from studies.report.summary import SUMMARIES
+from studies.report.summaries import SUMMARIES
 from studies.store.ledger import Ledger
 from studies.sweep.find_study import find_study
 from studies.sweep.plan import expected, plan

@@ -1,8 +1,7 @@
 """Tables for people to read, in Markdown: the results of `make study`, the recommended bodies, and the accuracy of
 each rung of the ladder of bodies."""
 
-from collections.abc import Callable, Hashable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Hashable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 from studies.metrics.cells import MISSING, UNRESOLVED_MARK, UNRESOLVED_NOTE, value_cell
@@ -10,7 +9,6 @@ from studies.metrics.judged import Judged, Measured, cheapest, judged, nearest, 
 from studies.metrics.run import Run
 from studies.metrics.table import UNRESOLVED, study_table
 from studies.metrics.wish import Wish, usual_wish
-from studies.report.population import members_of, trust_of, worst_of
 from studies.runs.recipe_text import body_words
 from studies.scene.scene import Scene
 
@@ -19,25 +17,6 @@ PAPER = 550
 LADDER_SCENES = ("ball_clamped", "liver_press")
 """Scenes in which every rung has a force and a displacement."""
 WHY_NONE = "no body meets the target and keeps the shape, or the reference is not accurate enough to decide"
-
-
-@dataclass(frozen=True)
-class Summary:
-    """A text that is read off a study, and the page that shows it between its marks."""
-
-    study: str
-    file: str
-    """Below the results folder."""
-    page: str
-    """Below the folder of README.md."""
-    name: str
-    """In the marks."""
-    text: Callable[[Sequence[Run]], str]
-
-    @property
-    def marks(self) -> tuple[str, str]:
-        """The lines of the page between which it stands."""
-        return f"<!-- {self.name}: begin -->", f"<!-- {self.name}: end -->"
 
 
 def results_of(runs: Sequence[Run]) -> str:
@@ -156,16 +135,6 @@ def ladder_of(runs: Sequence[Run]) -> str:
                 cells = [body_words(one.case.body), str(volumes[one.case.key]), f"{one.case.dt_fraction:g}"]
                 lines.append(f"| {name} | " + " | ".join([*cells, *_errors(one), *_shape(one), _real_time(one)]) + " |")
     return "\n".join(lines)
-
-
-SUMMARIES = (
-    Summary("volume_loss", "summary.md", "docs/findings.md", "results", results_of),
-    Summary("accuracy", "accuracy/recommended.md", "docs/findings.md", "recommended", recommended_of),
-    Summary("accuracy", "accuracy/ladder.md", "docs/paper.md", "ladder", ladder_of),
-    Summary("population", "population/population.md", "docs/population.md", "population", members_of),
-    Summary("population", "population/worst.md", "docs/population.md", "worst", worst_of),
-    Summary("population", "population/trust.md", "docs/population.md", "trust", trust_of),
-)
 
 
 def _errors(one: Judged) -> list[str]:

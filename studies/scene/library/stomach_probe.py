@@ -1,9 +1,10 @@
 """A filled stomach before the back wall, palpated by a spherical probe on its front."""
 
 from massspring import Plane, Sphere, Trajectory
-from studies.geometry.organs.stomach import STOMACH_REGIONS, stomach_shape
+from studies.geometry.organs.stomach import STOMACH_REGIONS
+from studies.geometry.shape.levelset import PalpationPoint
 from studies.scene.library.stomach_press import BACK
-from studies.scene.placing import along, press_times, probe_of, scaled
+from studies.scene.placing import along, press_times, scaled
 from studies.scene.scene import ForceOutput, Held, Lumen, Organ, ReferencePlan, Scene
 from studies.scene.tissues import STOMACH
 
@@ -12,7 +13,11 @@ DEPTH = 0.012  # m
 GAP = 0.0005  # m between probe and surface at the start
 PRESS_END = 6.0  # s
 DURATION = 8.0  # s
-PROBE = probe_of(stomach_shape())
+PROBE = PalpationPoint(
+    (0.0415, -0.04116513145931427, 0.0),
+    (0.16318724755802705, -0.9764054177097882, 0.1414297794009782),
+)
+"""As a number: computed from the surface, its last bits would depend on the processor."""
 INWARD = scaled(PROBE.normal, -1.0)
 
 STOMACH_PROBE = Scene(

@@ -16,7 +16,7 @@ from studies.report import publish as publishing
 from studies.report.publish import EXTRAS, PUBLISHED, between, check, publish, publish_some
 from studies.report.published_code import CURRENT, FILE, STALE, UNKNOWN, noted, study_code
 from studies.report.sentences import Sentences
-from studies.report.summary import SUMMARIES
+from studies.report.summaries import SUMMARIES
 from studies.runs import current as runs
 from studies.runs.current import case_path
 from studies.store import stamps
@@ -280,6 +280,19 @@ def test_other_code_of_a_run_makes_a_study_stale(current, home, monkeypatch):
     assert noted(home / PUBLISHED)["volume_loss"] == study_code(HEADLINE)
     monkeypatch.setattr(runs, "run_fingerprint", lambda: "another code")
     assert status_of(home, HEADLINE)["volume_loss"] == STALE
+
+
+def test_other_code_of_a_text_makes_the_text_stale_and_not_its_study(current, home, monkeypatch):
+    publish_some(current, [HEADLINE], home)
+    members, text = SUMMARIES[3].text, SUMMARIES[0]  # of another module
+    monkeypatch.setattr(publishing, "SUMMARIES", (replace(text, text=members),))
+    assert status_of(home, HEADLINE)["summary.md"] == STALE
+    assert status_of(home, HEADLINE)["volume_loss"] == CURRENT
+
+
+@pytest.mark.parametrize("summary", SUMMARIES, ids=lambda summary: summary.name)
+def test_the_code_of_every_published_text_is_noted(summary):
+    assert summary.file in noted(REPOSITORY / PUBLISHED)
 
 
 def test_the_command_says_what_is_behind_with_exit_code_1(current, home, organbench, monkeypatch):

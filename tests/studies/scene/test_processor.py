@@ -1,0 +1,56 @@
+"""A scene is its numbers: they, and so the reference of a scene, must not depend on the processor."""
+
+import json
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from studies.base.portable import environment
+from studies.catalog import STUDIES
+from studies.catalog.population.draw import member
+from studies.geometry import SHAPES
+from studies.geometry.shape.levelset import normals
+from studies.reference.published import published
+from studies.report.published_code import study_code
+from studies.scene.library import KIDNEY_PROBE, LIVER_PROBE, STOMACH_PROBE
+from tests.studies.tiny import tiny_case, tiny_study
+
+MEMBERS = (("kidney", 9), ("kidney", 20), ("stomach", 14), ("stomach", 43))
+"""Random organs whose probe, computed with other instructions, is at another nanometre."""
+KEYS = """
+import json
+from tests.studies.scene.test_processor import keys
+print(json.dumps(keys()))
+"""
+
+
+def keys():
+    """The keys of all cases of the catalogue, and what is noted of a study of random organs."""
+    cases = {f"{study.name}: {case.name}": case.key for study in STUDIES for case in study.cases}
+    studies = (tiny_study(cases=(tiny_case(scene=member(organ, 0, number)),)) for organ, number in MEMBERS)
+    return cases | {f"{organ} {number}": study_code(one) for (organ, number), one in zip(MEMBERS, studies, strict=True)}
+
+
+def test_the_oldest_processor_has_the_same_scenes():
+    done = subprocess.run(
+        [sys.executable, "-c", KEYS], env=os.environ | environment(), capture_output=True, text=True, check=True
+    )
+    other, here = json.loads(done.stdout), keys()
+    assert [name for name in here if here[name] != other[name]] == [] and len(here) == len(other)
+
+
+@pytest.mark.parametrize("scene", [LIVER_PROBE, KIDNEY_PROBE, STOMACH_PROBE], ids=lambda scene: scene.name)
+def test_a_probe_starts_half_a_millimetre_from_the_surface(scene):
+    shape, probe = SHAPES[scene.organ.shape](), scene.obstacles[0]
+    outward = -np.asarray(scene.probed.direction)
+    point = np.asarray(probe.centre) - (probe.radius + 0.0005) * outward
+    assert shape.level(point[None])[0] == pytest.approx(0.0, abs=1e-12)
+    assert outward == pytest.approx(normals(shape, point[None])[0], abs=1e-9)
+
+
+@pytest.mark.parametrize("scene", [LIVER_PROBE, KIDNEY_PROBE, STOMACH_PROBE], ids=lambda scene: scene.name)
+def test_its_reference_is_published(scene):
+    assert published(scene) is not None
