@@ -1,4 +1,4 @@
-"""Meshes of organs: gmsh and meshio live here only. Lengths in metres, surface nodes numbered first.
+"""Meshes of organs. Lengths are in metres, and surface nodes are numbered first.
 
 The public names are those in the stub `__init__.pyi`. Each name loads its module on first use.
 """

@@ -1,4 +1,4 @@
-"""Errors of each model in four quantities, with the uncertainty of the reference."""
+"""Errors of each body and method in four quantities, with the uncertainty of the reference."""
 
 from collections.abc import Sequence
 
@@ -37,7 +37,7 @@ QUANTITIES = {
     "silhouette_error": "silhouette",
 }
 ROOM = 1.7
-"""Top of the axis over the largest value: so much that its marker is whole."""
+"""Top of the axis over the largest value, so that its marker is not clipped."""
 REACH = 0.38
 """Half the width of a group of points; groups are 1 apart."""
 STRUCK_OUT = {"marker": "x", "linestyle": "", "color": BLACK, "markersize": 11, "markeredgewidth": 1.4}
@@ -68,7 +68,7 @@ def figure(runs: Sequence[Run]) -> Figure:
 def _draw_scene(
     axes: Axes, group: Sequence[Run], metrics: Sequence[Metric], looks: dict[BodyRecipe, BodyLook]
 ) -> list[float]:
-    """The values drawn, errors and floors."""
+    """Draws the errors of a scene; returns the values drawn [%], errors and uncertainties of the reference."""
     series = grouped(group, lambda run: (looks[run.case.body], run.case.method.name))
     offsets = np.linspace(-REACH, REACH, len(series) + 2)[1:-1]
     drawn: list[float] = []
@@ -96,8 +96,8 @@ def _draw_scene(
 def _draw_point(
     axes: Axes, x: float, error: float, uncertainty: float, run: Run, looks: dict[BodyRecipe, BodyLook]
 ) -> float:
-    """A filled marker if the uncertainty of the reference is much smaller than the error, else a hollow one; never
-    drawn below that uncertainty. A run that did not end ok is struck out."""
+    """Draws a filled marker if the uncertainty of the reference is at most RESOLVED_SHARE of the error, else a hollow
+    one, and strikes out a run that did not end ok. Returns the height [%], which is not below the uncertainty."""
     height = max(error, uncertainty)
     colour = looks[run.case.body].colour(run.case.method.name)
     face = colour if uncertainty <= RESOLVED_SHARE * error else "white"
@@ -109,7 +109,7 @@ def _draw_point(
 
 
 def _struck_out(shown: Sequence[Run]) -> list[Line2D]:
-    """The handle of runs that did not end ok, where there are some."""
+    """The legend entry of runs that did not end ok; [] if there are none."""
     states = sorted({readable(run.record.status) for run in shown if run.record.status != Status.OK})
     return [Line2D([], [], label=f"struck out: {', '.join(states)}, no sound result", **STRUCK_OUT)] if states else []
 

@@ -1,4 +1,4 @@
-"""Ratio of the frame times with and without the constraint, and whether the difference can be resolved."""
+"""Ratio of the frame times with and without the constraint, and whether it differs measurably from 1."""
 
 from collections.abc import Sequence
 
@@ -16,7 +16,7 @@ from studies.plots.style.style import BLACK, GREY, NORMAL, drawing, method_colou
 
 TITLE = "Cost of keeping the volume"
 Row = tuple[str, str, Ratio]
-"""Body, method, and how many times longer its frame takes than the free one's."""
+"""Body, method, and the ratio of its frame time to that of the method without a constraint."""
 
 
 @styled
@@ -49,7 +49,7 @@ def figure(runs: Sequence[Run]) -> Figure:
 
 
 def ratios(runs: Sequence[Run]) -> list[Row]:
-    """Every timed method over the free one on the same body in the same scene, with its interval."""
+    """Frame time of every timed method over that of `Free` with the same body in the same scene, with its interval."""
     rows: list[Row] = []
     looks = body_looks(runs, ignored=("nodes",))
     for body in grouped([run for run in runs if run.timing], lambda run: run.case.replaced(method=Free()).key):

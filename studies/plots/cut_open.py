@@ -1,4 +1,4 @@
-"""A body before its incision, after it and next to the reference: how it gapes, as a picture."""
+"""A body before its incision, after it, and the reference: pictures of how it gapes."""
 
 from collections.abc import Sequence
 
@@ -27,14 +27,15 @@ CAMERAS = {
 OTHER = Camera(azimuth=-72.0, elevation=25.0)
 TISSUE, STEEL, INSIDE = "#D9B3A6", "#A9A9A9", "#8C2F39"
 SIZE = (3.5, 3.0)
-"""Of a panel [inch]."""
+"""Width and height of a panel [inch]."""
 DPI = 150
 LEAST_NEWTONS = 0.1
 """Smaller forces are written in mN."""
 
 
 def incised(run: Run) -> bool:
-    """Whether the run has an incision with a front, its end, a checkpoint before all cuts, and a reference."""
+    """Whether a run can be shown: it has ended, has a reference and an incision with a front, and its first checkpoint
+    is not after any cut."""
     cuts, first = run.case.scene.cuts, run.case.scene.checkpoints[0]
     whole = any(cut.within is not None for cut in cuts) and all(first <= cut.at for cut in cuts)
     return whole and run.reference is not None and run.record.status in COMPARABLE
@@ -42,7 +43,7 @@ def incised(run: Run) -> bool:
 
 @styled
 def figure(runs: Sequence[Run]) -> Figure:
-    """One row for each scene: its body with the smallest error of the opening."""
+    """One row per scene: the body with the smallest opening error, before and after the cut, and the reference."""
     scenes = by_scene([run for run in runs if incised(run)])
     if not scenes:
         return blank(TITLE, "no run of a scene with an incision and a reference has ended yet")
@@ -58,7 +59,7 @@ def figure(runs: Sequence[Run]) -> Figure:
 
 def _draw_row(row: Sequence[Axes], run: Run, camera: Camera) -> None:
     reference = run.reference
-    assert reference is not None  # incised() asked
+    assert reference is not None  # incised() has checked
     rest, triangles = run.fields.rest, run.fields.triangles.astype(np.int64)
     nodes, facets = reference.field("nodes"), reference.triangles
     seen = [
@@ -71,7 +72,7 @@ def _draw_row(row: Sequence[Axes], run: Run, camera: Camera) -> None:
     room = 0.06 * (high - low)
     for axes, (points, faces, inside, colour) in zip(row, seen, strict=True):
         colours = np.where(inside[:, None], to_rgb(INSIDE), to_rgb(colour))
-        # The surface and the faces of the cut meet in an edge: light must not run over it.
+        # The surface and the faces of the cut meet in a sharp edge, so their normals are averaged separately.
         normals = np.empty((len(faces), 3))
         for part in (inside, ~inside):
             normals[part] = smooth_normals(points, faces[part])
@@ -94,7 +95,7 @@ def _draw_row(row: Sequence[Axes], run: Run, camera: Camera) -> None:
 
 
 def in_newtons(force: float) -> str:
-    """A force [N] in the unit in which it has digits."""
+    """A force [N] in words, in N, or in mN below LEAST_NEWTONS."""
     value, unit = (force, "N") if abs(force) >= LEAST_NEWTONS else (1e3 * force, "mN")
     return f"{value:.2f} {unit}".replace("-", "−")
 

@@ -1,4 +1,4 @@
-"""The probed force while a scene is pressed and then held, next to the reference at its checkpoints."""
+"""The probed force while a scene is pressed and then held, and the reference at its checkpoints."""
 
 import math
 from collections.abc import Sequence
@@ -36,16 +36,16 @@ from studies.scene.library import Scene
 TITLE = "Force of the press against the reference"
 CUT_TITLE = "Force on the end that is moved, of a body that is cut, against the reference"
 FORCES = [metric for metric in METRICS if metric.name == "force_end"]
-"""What is written at the ends of the lines."""
+"""Metrics that are written at the ends of the lines."""
 ROOM = 1.06
 """Top of the axis over the largest force."""
 LABEL_GAP = 0.085
-"""Least distance of two labels over the height of the axis: one line of type."""
+"""Smallest distance of two labels over the height of the axis: one line of text."""
 
 
 @styled
 def figure(runs: Sequence[Run]) -> Figure:
-    """One panel per scene, the error at the last checkpoint at the end of each line."""
+    """One panel per scene, with the error at the last checkpoint at the end of each line."""
     shown = [run for run in runs if has_frames(run) and "force" in run.case.scene.quantities]
     if not shown:
         return blank(TITLE, "no run of a scene that asks for a force has recorded a frame yet")
@@ -70,7 +70,7 @@ def figure(runs: Sequence[Run]) -> Figure:
 def _draw_scene(axes: Axes, group: Sequence[Run], looks: dict[BodyRecipe, BodyLook]) -> None:
     ends = []
     for same in grouped(group, lambda run: (run.case.body, run.case.method.name)):
-        run = same[0]  # another time step lies on the same line; the table shows by how much it does not
+        run = same[0]  # runs with another time step lie on nearly the same line; the table shows the differences
         good = slice(0, good_frames(run))
         colour = looks[run.case.body].colour(run.case.method.name)
         axes.plot(run.fields.t[good], run.force[good], color=colour, linestyle=looks[run.case.body].line)
@@ -89,8 +89,10 @@ def _draw_scene(axes: Axes, group: Sequence[Run], looks: dict[BodyRecipe, BodyLo
 
 
 def _way(run: Run, motion: Trajectory) -> str:
-    """How far the press goes in from its first touch: "20 mm "; empty without a reference, which gives the first touch:
-    the first points of contact are not nodes of a coarse body."""
+    """How far the probed body moves, an obstacle from its first contact, in words: "20 mm ".
+
+    Empty for an obstacle without a reference: its nodes give the first contact, which a coarse body misses.
+    """
     way = float(np.linalg.norm(motion.displacements[-1]))
     if run.case.scene.probed.what == "obstacle":
         if run.reference is None:
@@ -107,7 +109,7 @@ def _motion(scene: Scene) -> Trajectory:
 
 
 def _error(run: Run) -> str:
-    """What stands at the end of a line."""
+    """The label at the end of a line: the error, without a reference the force, or the status of a failed run."""
     if run.record.status not in COMPARABLE:
         return str(run.record.status)
     if run.reference is None:
@@ -116,8 +118,8 @@ def _error(run: Run) -> str:
 
 
 def _label(axes: Axes, ends: Sequence[tuple[float, str, str]], low: float, top: float) -> None:
-    """Errors to the right of the axis, one under the other where lines end close together."""
-    # A line on its way to infinity ends outside the axis; its label stays at the border.
+    """Writes the errors to the right of the axis, one under the other if lines end close together."""
+    # A diverging line ends outside the axis; its label stays at the border.
     forces = np.array([force if np.isfinite(force) else top for force, _, _ in ends])
     heights = (np.clip(forces, low, top) - low) / (top - low)
     for at, (_, text, colour) in zip(spread_out(heights, LABEL_GAP, 1.0), ends, strict=True):
@@ -125,14 +127,16 @@ def _label(axes: Axes, ends: Sequence[tuple[float, str, str]], low: float, top: 
 
 
 def _draw_reference(axes: Axes, run: Run, stop: float, cut: float) -> None:
-    """The path of equilibria, in two where a `cut` comes between: as the press rests from `stop` on, so does the last
-    of them."""
+    """Draws the path of equilibria of the reference, interrupted at the time `cut` [s].
+
+    From `stop` [s] on the press rests, and the path is constant at the last equilibrium.
+    """
     if run.reference is None:
         return
     t, force = run.reference.field("t"), run.reference.force
     path_t = np.append(t[t < stop], (stop, max(t[-1], stop)))
     path = np.append(force[t < stop], (force[-1], force[-1]))
-    # The floor is relative to the norm over all checkpoints, so one of them carries this much of it.
+    # The uncertainty is relative to the norm over all checkpoints; each of them gets an equal share of it.
     spread = run.reference.total_uncertainty["force"] * np.linalg.norm(force) / np.sqrt(len(force))
     for side in (path_t <= cut, path_t > cut):
         axes.fill_between(
@@ -143,8 +147,10 @@ def _draw_reference(axes: Axes, run: Run, stop: float, cut: float) -> None:
 
 
 def _range(group: Sequence[Run]) -> tuple[float, float]:
-    """Ends of the axis [N]: from zero to the largest force of the reference and of runs that ended well; from the
-    smallest to zero where that is further away, as where a held end is pressed and not pulled."""
+    """Ends of the axis [N], from the forces of the reference and of runs that ended well.
+
+    From zero to the largest force, or from the smallest force to zero if that is farther from zero.
+    """
     forces = [run.force for run in group if run.record.status in COMPARABLE]
     forces += [run.reference.force for run in group[:1] if run.reference is not None]
     lowest, highest = (float(end([0.0, *(end(force) for force in forces)])) for end in (np.min, np.max))

@@ -1,4 +1,4 @@
-"""What a frame costs: its history for every body with the constraint on and off, deadlines, percentiles."""
+"""The time of a frame: history and percentiles for every body and method, and deadlines."""
 
 from collections.abc import Sequence
 
@@ -27,7 +27,7 @@ NS_PER_MS = 1e6
 
 @styled
 def figure(runs: Sequence[Run]) -> Figure:
-    """One panel of history per body, all percentiles below."""
+    """One panel per body with the history of its frame times, and all percentiles below."""
     timed = [(run, run.timing) for run in runs if run.timing is not None]
     if not timed:
         return blank(TITLE, "no frame times from this machine and this code yet")
@@ -55,12 +55,12 @@ def figure(runs: Sequence[Run]) -> Figure:
 
 
 def _untimed(runs: Sequence[Run]) -> list[Run]:
-    """Only what has no frame times needs words here."""
+    """Runs that should have frame times and have none, for the notes."""
     return [run for run in runs if run.timing is None and run.case.timed]
 
 
 def _span(timings: Sequence[FrameTiming]) -> tuple[float, float]:
-    """Axis from below the fastest frame to above the largest deadline [ms]."""
+    """Ends of the axis [ms]: below the fastest frame, and above the slowest frame and the largest deadline."""
     fastest = min(float(timing.frame_ns.min()) for timing in timings) / NS_PER_MS
     slowest = max(float(timing.frame_ns.max()) for timing in timings) / NS_PER_MS
     return fastest / 1.6, 1.6 * max(slowest, max(DEADLINES_MS))
@@ -68,11 +68,11 @@ def _span(timings: Sequence[FrameTiming]) -> tuple[float, float]:
 
 def _draw_history(axes: Axes, body: Sequence[Run], span: tuple[float, float], name: str) -> None:
     for run in body:
-        assert run.timing is not None  # figure() chose those
+        assert run.timing is not None  # figure() has chosen these
         frames, t = run.timing.frame_ns / NS_PER_MS, run.fields.t
         colour = method_colour(run.case.method.name)
         low, high = frames.min(axis=0), frames.max(axis=0)
-        # As a picture also in an SVG: the band has an edge at every frame.
+        # Rasterised in an SVG too, because the band has a corner at every frame.
         axes.fill_between(t, low, high, color=colour, alpha=0.35, linewidth=0, rasterized=True)
         axes.plot(t, np.median(frames, axis=0), color=colour, linewidth=1.1)
     for deadline in DEADLINES_MS:
@@ -90,7 +90,7 @@ def _label_deadlines(axes: Axes) -> None:
 
 
 def _names(runs: Sequence[Run]) -> dict[int, str]:
-    """By the id of a run: its scene, its body and the surface nodes."""
+    """id of a run -> its scene, body and surface nodes in words."""
     looks = body_looks(runs, ignored=("nodes",))
     return {
         id(run): f"{heading(run.case.scene.name)}, {looks[run.case.body].name}, {run.case.body.nodes:,}" for run in runs
@@ -100,11 +100,11 @@ def _names(runs: Sequence[Run]) -> dict[int, str]:
 def _draw_percentiles(
     axes: Axes, bodies: Sequence[Sequence[Run]], span: tuple[float, float], names: dict[int, str]
 ) -> None:
-    """One line per case from the median to the slowest frame."""
+    """Draws one line per case from the median to the slowest frame, with markers of the percentiles."""
     labels: list[str] = []
     for body in bodies:
         for place, run in enumerate(body):
-            assert run.timing is not None  # figure() chose those
+            assert run.timing is not None  # figure() has chosen these
             quantiles = {name: ns / NS_PER_MS for name, ns in percentiles(run.timing.frame_ns).items()}
             colour = method_colour(run.case.method.name)
             axes.plot([quantiles["p50"], quantiles["max"]], [len(labels)] * 2, color=colour, linewidth=1)

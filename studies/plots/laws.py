@@ -1,4 +1,4 @@
-"""What the stiffness law does: force error and step limit over mesh size, with one volume and with nodal volumes."""
+"""Effect of the stiffness law: force error and step limit over mesh size, with one volume and with nodal volumes."""
 
 from collections.abc import Callable, Sequence
 from itertools import cycle
@@ -50,7 +50,7 @@ COLOURS = {
     "cotangent": GREEN,
     "per_kind": VERMILLION,
 }
-"""Of laws."""
+"""Stiffness law -> colour."""
 VOLUMES = {
     "tetrahedral": ("one volume", (0, (4, 1.6)), "o"),
     "tetrahedral, one volume": ("one volume", (0, (4, 1.6)), "o"),
@@ -58,7 +58,7 @@ VOLUMES = {
     "surface, one volume": ("one volume", (0, (4, 1.6)), "o"),
     "tetrahedral, nodal volumes": ("one volume per node", "-", "^"),
 }
-"""Of BodyRecipe.series -> (words, line, marker); another body takes a spare look and its own words."""
+"""BodyRecipe.series -> (words, line, marker); other bodies take a spare look and their series as words."""
 Look = tuple[str, str, tuple[str, LineStyleType, str]]
 """Law, its colour, and words, line and marker of the volumes."""
 FORCE, MS_PER_S = "force_end", 1e3
@@ -66,7 +66,7 @@ FORCE, MS_PER_S = "force_end", 1e3
 
 @styled
 def figure(runs: Sequence[Run]) -> Figure:
-    """One row per scene: force error left, step limit right; a line joins the meshes of one law and its volumes."""
+    """One row per scene: force error left, step limit right; a line joins the meshes of one law and kind of volumes."""
     shown = [run for run in runs if run.record.status in COMPARABLE]
     if not shown:
         return blank(TITLE, "no run has finished yet")
@@ -95,7 +95,7 @@ def figure(runs: Sequence[Run]) -> Figure:
 
 
 def _looks(shown: Sequence[Run]) -> dict[int, Look]:
-    """By the id of a run. Laws and bodies that are not named above take the next spare colour and look."""
+    """id of a run -> its look. Laws and bodies that are not in COLOURS and VOLUMES take the next spare ones."""
     laws, bodies = dict(COLOURS), dict(VOLUMES)
     colours, spare = cycle((BLACK, *MUTED)), cycle(SPARE_LOOKS)
     looks = {}
@@ -114,7 +114,7 @@ def _law(run: Run) -> str:
 
 
 def _draw_lines(axes: Axes, group: Sequence[Run], value: Callable[[Run], float], looks: dict[int, Look]) -> int:
-    """Number of points drawn."""
+    """Draws finite values over the surface nodes; returns the number of points drawn."""
     drawn = 0
     for same in grouped(group, lambda run: looks[id(run)]):
         points = sorted((run.case.body.nodes, value(run)) for run in same if np.isfinite(value(run)))
@@ -147,7 +147,7 @@ def _handles(looks: dict[int, Look]) -> list:
 
 
 def _face(colour: str, marker: str) -> str:
-    """Nodal volumes have filled markers."""
+    """Colour inside a marker: that of nodal volumes is filled, any other hollow."""
     return colour if marker == "^" else "white"
 
 

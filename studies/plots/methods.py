@@ -1,4 +1,4 @@
-"""Every method on the same body: one row per method, one panel per quantity, one marker per scene."""
+"""Every method on the same bodies: one row per method, one panel per quantity, one marker per scene."""
 
 from collections.abc import Sequence
 
@@ -39,13 +39,13 @@ COST = "computing time [ms/s]"
 MS_PER_S = 1e3
 SCENE_LOOKS = ((BLUE, "o"), (ORANGE, "s"), (GREEN, "^"), (PURPLE, "D"))
 LEAST = 1e-4
-"""Volume errors below a millionth are drawn there, with an arrow [%]."""
+"""Smaller values are drawn here, with an arrow [%]."""
 APART = 0.12
-"""How far the scenes of a row stand above and below its middle."""
+"""Half the distance of the markers of two scenes in a row, over the distance of rows."""
 
 
 def label(method: Method) -> str:
-    """Its name, and the settings that are not the defaults: "element (bulk modulus 1e+06, hard)"."""
+    """The name of a method and its settings other than the defaults: "element (bulk modulus 1e+06, hard)"."""
     label = []
     for name, value in chosen_settings(method).items():
         number = f" {value:g}" if not isinstance(value, (bool, str)) else f" {value}" if isinstance(value, str) else ""
@@ -54,7 +54,7 @@ def label(method: Method) -> str:
 
 
 def row_names(runs: Sequence[Run]) -> dict[int, str]:
-    """By the id of a run: its method, what sets its body apart from the others, and its step where that was chosen."""
+    """id of a run -> its method, what distinguishes its body from the others, and its step if that was chosen."""
     looks = body_looks(runs)
     common = {run.case.body.kind for run in runs}
     names = {}
@@ -69,7 +69,7 @@ def row_names(runs: Sequence[Run]) -> dict[int, str]:
 
 @styled
 def figure(runs: Sequence[Run]) -> Figure:
-    """Panels side by side share the rows; error bars of the reference are dotted lines of the scene's colour."""
+    """Panels share their rows; a dotted line in the colour of a scene is the uncertainty of its reference."""
     shown = [run for run in runs if run.record.status in COMPARABLE]
     if not shown:
         return blank(TITLE, "no run has finished yet")
@@ -96,7 +96,7 @@ def figure(runs: Sequence[Run]) -> Figure:
 
 
 def _draw(axes: Axes, names: dict[int, str], scenes: dict[str, list[Run]], metric: Metric | None) -> None:
-    """One quantity; None is the computing time."""
+    """Draws the panel of a metric, or of the computing time for None."""
     drawn: list[float] = []
     rows = list(dict.fromkeys(names.values()))
     for number, group in enumerate(scenes.values()):
@@ -128,7 +128,7 @@ def _draw(axes: Axes, names: dict[int, str], scenes: dict[str, list[Run]], metri
 
 
 def cost(run: Run) -> float:
-    """Computing time per simulated second [ms/s]: what explicit steps of different size are compared by."""
+    """Computing time per simulated second [ms/s], which makes explicit steps of different size comparable."""
     return MS_PER_S / real_time(run)
 
 

@@ -1,4 +1,4 @@
-"""How far an incision gapes, from its front to its mouth, next to the reference."""
+"""How far an incision gapes from its front to its mouth, and the reference."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -30,21 +30,21 @@ TITLE = "Opening of the incision against the reference"
 OPENING = metric("opening_error")
 COLUMNS = 2
 BINS = 8
-"""Stretches between front and mouth over which the opening is averaged by area."""
+"""Intervals of depth between front and mouth in which the opening is averaged by area."""
 MM = 1e3
 SHUT = 1e-3
-"""An opening below this part of the size is none."""
+"""Opening over the size of the body below which an incision counts as shut."""
 
 
 def gapes(run: Run) -> bool:
-    """Whether the run has an incision with a front that opens, and its end."""
+    """Whether a run has ended and its incision with a front is open."""
     if not fronts(run) or run.record.status not in COMPARABLE:
         return False
     return float(run.gap(run.opening).max()) > SHUT * run.size
 
 
 def fronts(run: Run) -> list[int]:
-    """The numbers of the cuts of its scene that end inside the organ."""
+    """The indices of the cuts of its scene that have a front, that is, end inside the organ."""
     return [k for k, cut in enumerate(run.case.scene.cuts) if cut.within is not None]
 
 
@@ -84,9 +84,12 @@ def _draw_cut(axes: Axes, group: Sequence[Run], number: int, looks: dict[BodyRec
 
 
 def _profile(run: Run, opening: np.ndarray, number: int) -> tuple[np.ndarray, np.ndarray]:
-    """Distances from the front of a cut [mm] and the mean opening there [mm], of the stretches that hold nodes."""
+    """Mean distance from the front of a cut [mm] and mean opening [mm] in each interval that has nodes.
+
+    opening: (p, 3) [m] of all pairs of cut nodes; number: index of the cut.
+    """
     within, here = run.case.scene.cuts[number].within, run.cut_of_pairs == number
-    assert within is not None  # fronts() asked
+    assert within is not None  # fronts() has checked
     depth = -within.level(run.fields.rest[run.cut_pairs[here, 0]])
     gap, weights = run.gap(opening)[here], run.cut_weights[here]
     place = np.minimum((BINS * depth / depth.max()).astype(int), BINS - 1)
@@ -96,5 +99,5 @@ def _profile(run: Run, opening: np.ndarray, number: int) -> tuple[np.ndarray, np
 
 
 def draw(runs: Sequence[Run], path: Path) -> None:
-    """Writes the chart as PNG."""
+    """Writes the chart as PNG. Raises StudyError if it cannot be written."""
     save(figure(runs), path)

@@ -1,4 +1,4 @@
-"""How well each piece of a body that is cut keeps its volume, and all pieces together."""
+"""How well each piece of a cut body keeps its volume, and all pieces together."""
 
 import textwrap
 from collections.abc import Sequence
@@ -17,22 +17,22 @@ from studies.plots.style.style import BLACK, BLUE, GREY, ORANGE, SMALL, drawing,
 TITLE = "Volumes of the pieces of a body that is cut"
 COLUMNS = 3
 LETTERS = 34
-"""Of a name in one line above a panel."""
+"""Letters in a line of a name above a panel."""
 LOOKS = ((BLUE, "-"), (ORANGE, (0, (5, 1.5))))
-"""Of the pieces, in turns."""
+"""Colours and lines of the pieces, in turn."""
 PERCENT = 100.0
 SMALLEST = 1e-8
-"""Bottom of the axis [%]: below it stands only what rounding leaves."""
+"""Bottom of the axis [%]; smaller values are rounding errors."""
 
 
 def parts(run: Run) -> bool:
-    """Whether the run has frames of a body that its cut parts."""
+    """Whether a run has frames of a body that its cuts divide into pieces."""
     return bool(run.case.scene.cuts) and has_frames(run) and len(np.unique(run.field("cut_parts"))) > 1
 
 
 @styled
 def figure(runs: Sequence[Run]) -> Figure:
-    """One panel for each body of a scene."""
+    """One panel per scene, body and method."""
     shown = [run for run in runs if parts(run)]
     if not shown:
         return blank(TITLE, "no run of a body that is cut in pieces has recorded a frame yet")
@@ -75,7 +75,7 @@ def _draw_run(axes: Axes, run: Run) -> None:
 
 
 def _off(volume: np.ndarray, rest: float) -> np.ndarray:
-    """Zero has no logarithm; an exact volume lies on the bottom of the axis."""
+    """100 |volume / rest - 1| [%], at least SMALLEST, because zero has no logarithm."""
     return np.maximum(PERCENT * np.abs(volume / rest - 1), SMALLEST)
 
 

@@ -1,4 +1,4 @@
-"""Where an organ of the user is held and palpated: seen by the probe, and from the side."""
+"""Where an organ of the user is held and palpated: seen from the probe, and from the side."""
 
 from pathlib import Path
 
@@ -20,13 +20,13 @@ BAR = 0.02
 
 
 def draw_placing(mesh: OrganMesh, placing: Proposal, radius: float, path: Path) -> None:
-    """Draws a proposal into a PNG file; radius: of the probe [m]."""
+    """Writes the picture of a proposal as PNG; radius: of the probe [m]. Raises StudyError if it cannot be written."""
     save(figure(mesh, placing, radius), path)
 
 
 @styled
 def figure(mesh: OrganMesh, placing: Proposal, radius: float) -> Figure:
-    """Two views: as the probe sees the body, and turned by a right angle."""
+    """Two views: along the motion of the probe, and horizontally from the side, at a right angle; radius [m]."""
     x, y, z = placing.palpation.normal
     facing = Camera(float(np.degrees(np.arctan2(y, x))), float(np.degrees(np.arcsin(np.clip(z, -1.0, 1.0)))))
     sheet = page(7.0, 4.2)
@@ -39,7 +39,7 @@ def figure(mesh: OrganMesh, placing: Proposal, radius: float) -> Figure:
 
 
 def draw(axes: Axes, mesh: OrganMesh, placing: Proposal, radius: float, camera: Camera) -> None:
-    """The outer surface with its held end, and the probe before it presses."""
+    """Draws the outer surface with its held part, and the probe before it presses; radius [m]."""
     points, triangles = mesh.points[: mesh.outer_count], mesh.outer_triangles
     colours = uniform(TISSUE, len(triangles))
     colours[(placing.hold.level(points)[triangles] <= 0).all(axis=1)] = to_rgb(BLUE)

@@ -1,4 +1,4 @@
-"""The silicone beam: sag, frequency and damping against the tip load, measured and predicted."""
+"""The silicone beam: measured and predicted sag, frequency and damping over the tip load."""
 
 import itertools
 from collections.abc import Mapping, Sequence
@@ -16,7 +16,7 @@ TITLE = "A silicone beam let go: E and damping fitted without a load, the rest p
 LOOKS = tuple(zip((BLUE, SKY, GREEN, ORANGE, PURPLE, GREY, BLACK, *MUTED[:3]), "os^vDsXP*<", strict=True))
 MEASURED = "measured"
 REACH = {"sag": 6.0, "frequency": 15.0}
-"""Range of the axes, in their units; values beyond are named in a note."""
+"""Half the range of the axes, sag [mm] and frequency [%]; notes name the values beyond."""
 
 
 class Point(NamedTuple):
@@ -26,11 +26,11 @@ class Point(NamedTuple):
     newton: float
     """Tip load [N]."""
     sag: float
-    """Mean of the three markers [mm]."""
+    """Mean sag of the three markers [mm]."""
     frequency: float
-    """[Hz]."""
+    """Frequency [Hz]."""
     damping: float
-    """Ratio to critical damping [1]."""
+    """Damping ratio: damping over critical damping [1]."""
 
 
 class Bar(NamedTuple):
@@ -43,8 +43,10 @@ class Bar(NamedTuple):
 
 @styled
 def figure(rows: Sequence[Point], bars: Mapping[str, Sequence[Bar]]) -> Figure:
-    """A panel for each quantity in `bars` ("sag" [mm], "frequency" [Hz], "damping" [1]): the measurement is at 0, with
-    its uncertainty, and predictions are shown as differences from it."""
+    """A panel for each of the three quantities in `bars`: "sag" [mm], "frequency" [Hz], "damping" [1].
+
+    The panels of sag and frequency show differences from the measurement, [mm] and [%]; that of damping shows values.
+    """
     if not rows:
         return blank(TITLE, "nothing is predicted yet")
     sheet = page(11, 4.2)
@@ -72,7 +74,7 @@ def figure(rows: Sequence[Point], bars: Mapping[str, Sequence[Bar]]) -> Figure:
 def _draw(
     axes: Axes, quantity: str, rows: Sequence[Point], bars: Sequence[Bar], looks: Mapping[str, tuple[str, str]]
 ) -> list[str]:
-    """Measurement and predictions of one quantity; a note on each prediction that lies outside the axes."""
+    """Draws measurement and predictions of one quantity; returns a note on each prediction outside the axes."""
     truth = {bar.newton: bar.value for bar in bars}
 
     def shown(newton: float, value: float) -> float:
@@ -103,5 +105,5 @@ def _draw(
 
 
 def draw(rows: Sequence[Point], bars: Mapping[str, Sequence[Bar]], path: Path) -> None:
-    """Writes the chart as PNG."""
+    """Writes the chart as PNG. Raises StudyError if it cannot be written."""
     save(figure(rows, bars), path)

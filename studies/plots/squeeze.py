@@ -1,4 +1,5 @@
-"""The paper's Figure 2 as a picture: a ball at rest, squeezed without and with the constraint, and the reference."""
+"""Figure 2 of the paper (JHC05) as a picture: a ball at rest, squeezed without and with the constraint, and the
+reference."""
 
 from collections.abc import Sequence
 
@@ -21,18 +22,18 @@ TITLE = "A soft ball between two planes"
 SCENE, BODY = "ball_squeeze", "tetrahedral"
 CAMERA = Camera(azimuth=-62.0, elevation=9.0)
 PLATE, THICK = 1.40, 0.05
-"""Radius and thickness of a plane as drawn, over the ball's radius."""
+"""Radius and thickness of the discs that represent planes, over the radius of the ball."""
 PALER = 0.22
 REST, STEEL, GLASS = "#E8DCC8", "#8C8C8C", "#BFD3DC"
 NAMES = {"free": "Springs alone", "implicit_volume": "Volume kept"}
 KEPT = 0.05
-"""A change of the volume smaller than this [%] is given as a power of ten."""
+"""If the volume never changes by this much [%], an upper bound of the change is given as a power of ten."""
 DPI = 150
 
 
 @styled
 def figure(runs: Sequence[Run]) -> Figure:
-    """Four pictures in a row, one scale and one camera."""
+    """A row of pictures with one scale and one camera: the ball at rest, one per method, and the reference if any."""
     squeezed = _chosen(runs)
     if not squeezed:
         return blank(TITLE, f"no run of {readable(SCENE)} has finished yet")
@@ -64,7 +65,7 @@ def figure(runs: Sequence[Run]) -> Figure:
 
 
 def _chosen(runs: Sequence[Run]) -> list[Run]:
-    """The scene's run of each method with this body that has a last checkpoint; of several, the largest step."""
+    """The run of SCENE with BODY that has reached its last checkpoint, one per method: that with the largest step."""
     by_method: dict[str, Run] = {}
     for run in sorted(runs, key=lambda run: -run.record.attributes.get("dt", 0.0)):
         case = run.case
@@ -85,10 +86,10 @@ def _words(run: Run) -> tuple[str, list[str]]:
 
 
 def volume_words(end: float, worst: float) -> str:
-    """Change at the end [%], or where that shows no digit, the worst on the way."""
+    """In words: the volume change at the `end` [%], or an upper bound of the `worst` [%] if that is below KEPT."""
     if worst >= KEPT:
         return f"volume {end:+.1f} %".replace("-", "−")
-    worst = max(worst, 1e-14)  # what double precision resolves of a per cent
+    worst = max(worst, 1e-14)  # about the resolution of double precision [%]
     power = int(np.floor(np.log10(worst)))
     digit = int(np.ceil(worst / 10.0**power))
     if digit == 10:
@@ -100,7 +101,7 @@ def volume_words(end: float, worst: float) -> str:
 def _draw_ball(
     axes: Axes, run: Run, points: np.ndarray, triangles: np.ndarray, colour: str, at_rest: bool = False
 ) -> None:
-    """Plane below, body, plane above: with a low camera nothing else hides anything."""
+    """Draws the planes below, the body, and the planes above: the right order for a low camera."""
     size = _radius(run)
     t = 0.0 if at_rest else run.case.scene.checkpoints[-1]
     planes = [plane for plane in run.case.scene.obstacles if isinstance(plane, Plane)]
@@ -114,7 +115,8 @@ def _draw_ball(
 
 
 def draw_plane(axes: Axes, plane: Plane, t: float, size: float) -> None:
-    """A disc of glass that ends at the plane."""
+    """Draws a disc of glass whose face towards the body lies in the plane at time t [s]; size: of the ball, its radius
+    [m]."""
     middle = np.asarray(plane.point) + plane.path(t)
     turn = np.linspace(0, 2 * np.pi, 181)
     rim = PLATE * size * np.stack([np.cos(turn), np.sin(turn), 0 * turn], axis=1)
@@ -126,7 +128,7 @@ def draw_plane(axes: Axes, plane: Plane, t: float, size: float) -> None:
 
 
 def _draw_outline(axes: Axes, seen: np.ndarray) -> None:
-    """Where the reference ends: its shape is convex, so that is the hull of its points."""
+    """Draws the outline of the reference: its shape is convex, so it is the hull of its points (n, 2) [m]."""
     hull = seen[ConvexHull(seen).vertices]
     axes.add_patch(Polygon(hull, fill=False, edgecolor=BLACK, linewidth=1.3, linestyle=(0, (4, 2)), joinstyle="round"))
 

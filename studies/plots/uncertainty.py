@@ -22,15 +22,16 @@ WORDS = {
     "steps": "load steps (halved)",
 }
 LOWEST = 1e-4
-"""Where smaller shares are drawn [%]: they do not matter."""
+"""Smaller shares are drawn here [%]; they do not matter."""
 PERCENT = 100.0
 
 
 @styled
 def figure(uncertainties: Mapping[str, Mapping[str, Uncertainty]]) -> Figure:
-    """One panel per scene, a row per quantity: its shares, and a bar up to their sum.
+    """One panel per scene, a row per quantity: its shares, and a bar up to the total, the root of their sum of squares.
 
-    Panels share their rows: one that its scene does not allow stays empty.
+    uncertainties: scene -> quantity -> its uncertainty. All panels have the same rows; a row stays empty if the scene
+    does not have the quantity.
     """
     if not uncertainties:
         return blank(TITLE, "no reference has been solved on its family of meshes yet")

@@ -1,4 +1,4 @@
-"""Convergence of the reference: errors over mesh size, and the effect of kappa/mu on results."""
+"""Convergence of the reference: error over mesh size, and the effect of kappa/mu on results."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -19,7 +19,7 @@ COLOURS, MARKERS = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY), "osD^vP"
 
 @styled
 def figure(curves: Sequence[Curve]) -> Figure:
-    """One panel for each group of curves, log over log, every curve with the slope at its fine end."""
+    """One log-log panel for each group of curves; the legend has the order of each between its two finest meshes."""
     if not curves:
         return blank(TITLE, "no oracle of this run was solved on several meshes")
     names = list(dict.fromkeys(curve.panel for curve in curves))
@@ -48,7 +48,7 @@ def _draw_curve(axes: Axes, curve: Curve, number: int) -> None:
 
 
 def _log_log(axes: Axes, curves: Sequence[Curve]) -> None:
-    """Sizes as fractions where there are meshes, errors by decades."""
+    """Makes both axes logarithmic, with the sizes of meshes as fractions."""
     axes.set(xscale="log", yscale="log")
     ticks = sorted({size for curve in curves for size in curve.sizes})
     kept: list[float] = []
@@ -65,7 +65,10 @@ draw = drawing(figure)
 
 @styled
 def kappa_figure(ratios: np.ndarray, rows: dict[str, np.ndarray]) -> Figure:
-    """Relative difference from the stiffest bulk, over kappa/mu: one line for each quantity."""
+    """Absolute relative difference from the result of the largest kappa/mu, over kappa/mu: one line per quantity.
+
+    ratios (n,): kappa/mu [1] in rising order; rows: quantity -> its values (n,).
+    """
     sheet = page(8.0, 4.6)
     axes = sheet.subplots()
     handles = []
@@ -88,5 +91,5 @@ def kappa_figure(ratios: np.ndarray, rows: dict[str, np.ndarray]) -> Figure:
 
 
 def draw_kappa(ratios: np.ndarray, rows: dict[str, np.ndarray], path: Path) -> None:
-    """Writes the chart as PNG."""
+    """Writes the chart of `kappa_figure` as PNG. Raises StudyError if it cannot be written."""
     save(kappa_figure(ratios, rows), path)

@@ -1,4 +1,4 @@
-"""How much volume each model loses over time: in per cent, and again on a logarithmic axis (the paper's Figure 3)."""
+"""How much volume each model loses over time: in per cent, and on a logarithmic axis (Figure 3 of the paper, JHC05)."""
 
 from collections.abc import Sequence
 
@@ -26,17 +26,17 @@ from studies.plots.style.style import BLACK, GREY, drawing, styled
 TITLE = "How much volume each model loses"
 PERCENT = 100.0
 SMALLEST = 1e-10
-"""Bottom of the logarithmic axis [%]: below it stands only what rounding leaves."""
+"""Bottom of the logarithmic axis [%]; smaller values are rounding errors."""
 VISIBLE = 0.5
-"""Change of a volume [%] from which on its sign is worth a panel."""
+"""Largest change of a volume [%] for which no panel shows its sign."""
 WIDEST = 4
-"""Scenes in a row."""
+"""Most scenes in a row."""
 
 
 @styled
 def figure(runs: Sequence[Run]) -> Figure:
-    """Of each scene a panel in per cent and a logarithmic one below it; the latter alone where no volume changes by
-    more than VISIBLE."""
+    """For each scene a panel in per cent and a logarithmic one below it; the latter alone if no volume in any scene
+    changes by more than VISIBLE."""
     shown = [run for run in runs if has_frames(run)]
     if not shown:
         return blank(TITLE, "no run has recorded a frame yet")
@@ -67,7 +67,7 @@ def figure(runs: Sequence[Run]) -> Figure:
 
 
 def _stiffness(shown: Sequence[Run]) -> list[str]:
-    """Why the reference does not lie on zero."""
+    """A note on why the volume of the reference changes; [] without a reference."""
     ratios = sorted({run.case.scene.tissue.bulk_over_shear for run in shown if run.reference is not None})
     if not ratios:
         return []
@@ -75,7 +75,7 @@ def _stiffness(shown: Sequence[Run]) -> list[str]:
 
 
 def _draw_run(axes: np.ndarray, run: Run, body: BodyLook, finer: bool) -> None:
-    """The first run of a series in full; the same with another step as a thin line where the two differ visibly."""
+    """Draws a run in all panels, or a `finer` one, with another step, as a thin line in the logarithmic panel only."""
     good = slice(0, good_frames(run))
     change = PERCENT * (run.volume_ratio[good] - 1)
     look = {"color": body.colour(run.case.method.name), "linestyle": body.line}
@@ -96,15 +96,14 @@ def _draw_reference(axes: np.ndarray, run: Run) -> None:
 
 
 def _range(shown: Sequence[Run]) -> tuple[float, float]:
-    """The least and the largest change [%] of runs that ended well: a volume on its way to infinity would flatten
-    everything else."""
+    """The smallest and the largest change [%] of runs that ended well: diverging volumes would flatten all others."""
     ended_well = [run for run in shown if run.record.status in COMPARABLE]
     change = np.concatenate([[0.0], *(PERCENT * (run.volume_ratio - 1) for run in ended_well)])
     return float(change.min()), float(change.max())
 
 
 def _scale(axes: np.ndarray, lowest: float, highest: float, first: bool) -> None:
-    """The same for all scenes; words on the axes of the first of a row alone."""
+    """Sets the same scale for all scenes; only the `first` of a row has labels at its vertical axes."""
     if len(axes) > 1:
         low, high = min(-1.0, lowest), max(0.5, highest)
         axes[0].set_ylim(1.08 * low, high + 0.04 * (high - low))

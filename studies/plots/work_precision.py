@@ -1,4 +1,4 @@
-"""What accuracy costs: errors of force and displacement against computing time, from the paper's body on."""
+"""What accuracy costs: errors of force and displacement over computing time."""
 
 from collections.abc import Sequence
 
@@ -22,25 +22,25 @@ from studies.store.record import Status
 
 TITLE = "Accuracy for computing time: down and to the left is better"
 COLUMNS = 3
-"""Scenes next to each other."""
+"""Most scenes in a row."""
 ROWS = {FORCE.name: "error of the force [%]", DISPLACEMENT.name: "mean error / largest u [%]"}
 FIELDS = {FORCE.name: "force", DISPLACEMENT.name: "displacement"}
-"""Of a wish and of a judged case."""
+"""Fields of a target (Wish) and of a judged case."""
 REAL_TIME, HALF = 1.0, 0.5
-"""Computing time over simulated time."""
+"""Computing time over simulated time [1]."""
 ROOM, BELOW, SIDE = 1.6, 3.0, 2.0
-"""Ends of the axes over the outermost values: above, below, where a name stands, and at the sides."""
+"""Factors between the outermost values and the ends of the axes: above, below (with room for a name), at the sides."""
 MOST_NAMED = 3
-"""Runs that a note names."""
+"""Most failed runs that a note names."""
 STARS = ("*", (4, 1, 0), (5, 1, 36))
 """Markers that have little area."""
 LOWEST, HIGHEST = 1e-3, 1e3
-"""Errors outside are drawn at the edge [%]."""
+"""Errors outside these limits are drawn at them [%]."""
 
 
 @styled
 def figure(runs: Sequence[Run]) -> Figure:
-    """For each scene a panel of the force and one of the displacement below it."""
+    """For each scene a panel of the force error, and one of the displacement error below it."""
     scenes = {name: _judged(group) for name, group in by_scene(runs).items()}
     scenes = {name: bodies for name, bodies in scenes.items() if bodies}
     if not scenes:
@@ -74,7 +74,7 @@ def figure(runs: Sequence[Run]) -> Figure:
 
 
 def _judged(group: Sequence[Run]) -> list[Judged]:
-    """Those that ended well and were timed here."""
+    """The judged cases of the runs of a scene whose computing time is known."""
     return [one for one in over_meshes(filter(None, map(judged, group))) if one.cost.known]
 
 
@@ -83,7 +83,7 @@ def _ends(values: Sequence[float]) -> tuple[float, float]:
 
 
 def _draw_scene(column: np.ndarray, bodies: Sequence[Judged], scene: Scene) -> list[list[float]]:
-    """The heights drawn in each of the two panels."""
+    """Draws the two panels of a scene; returns the heights drawn in each [%]."""
     wish, heights = usual_wish(scene), []
     recommended = cheapest(bodies, wish)
     for panel, metric in zip(column, (FORCE, DISPLACEMENT), strict=True):
@@ -108,7 +108,7 @@ def _why_not(metric: Metric) -> str:
 
 
 def _draw_goals(panel: Axes, bound: float) -> None:
-    """The corner that is accurate enough in real time; real time, and half of it."""
+    """Draws the area that is accurate enough (bound [%]) in real time, and lines at real time and half of it."""
     panel.fill_between([1e-9, REAL_TIME], 1e-12, bound, color=GREEN, alpha=0.12, linewidth=0)
     panel.axvline(REAL_TIME, color=BLACK, linewidth=1.4)
     panel.axvline(HALF, color=BLACK, linewidth=1.0, linestyle=(0, (1.5, 2)))
@@ -120,14 +120,16 @@ def _draw_front(panel: Axes, points: Sequence[tuple[Judged, Measured]]) -> None:
 
 
 def _height(error: Measured) -> float:
-    """Where an error is drawn: closer to the reference than it is to itself means no more than as good as it."""
+    """Height of an error [%]: at least the uncertainty of the reference, because smaller errors are not resolved."""
     uncertainty = error.uncertainty if error.uncertainty == error.uncertainty else 0.0
     return float(np.clip(max(abs(error.value), uncertainty), LOWEST, HIGHEST))
 
 
 def _draw_point(panel: Axes, one: Judged, error: Measured, field: str) -> None:
-    """A marker with the reference's uncertainty up and down, and the spread of the repeats to the sides. Of several
-    meshes the marker is the median, and the bar goes from the smallest error to the largest."""
+    """Draws a marker, with the uncertainty of the reference up and down and the spread of the repeats to the sides.
+
+    For several meshes the marker is the median, and the bar also covers the smallest and the largest error.
+    """
     look, heights = family_of(one.case), [_height(getattr(mesh, field)) for mesh in one.members or (one,)]
     height = float(np.median(heights))
     uncertainty = error.uncertainty if error.uncertainty == error.uncertainty else 0.0
@@ -154,20 +156,20 @@ def _size(look: Family) -> float:
 
 
 def _name(panel: Axes, points: Sequence[tuple[Judged, Measured]], recommended: Judged | None) -> None:
-    """Writes which points are the paper's body, the costliest, and the recommended recipe."""
+    """Labels the costliest point of the body of the paper, and labels and circles the recommended case."""
     papers = [(one, error) for one, error in points if family_of(one.case).name == PAPER]
     if papers:
         one, error = max(papers, key=lambda pair: pair[0].cost.value)
         _write(panel, one, error, PAPER, "bottom")
     for one, error in points:
         if one is recommended:
-            # To the lower left of the best for the time there is nothing.
+            # No point lies to the lower left of a point on the front.
             _write(panel, one, error, "recommended", "top")
             panel.plot(one.cost.value, _height(error), marker="o", markersize=15, markerfacecolor="none", color=BLACK)
 
 
 def _write(panel: Axes, one: Judged, error: Measured, words: str, vertical: str) -> None:
-    """Beside a point: to its right in the left half of the panel, else to its left."""
+    """Writes words to the right of a point in the left half of the panel, else to its left."""
     left, right = panel.get_xlim()
     in_left = one.cost.value < np.sqrt(left * right)
     panel.annotate(
@@ -185,7 +187,7 @@ def _write(panel: Axes, one: Judged, error: Measured, words: str, vertical: str)
 
 
 def words_of(body: BodyRecipe) -> str:
-    """A recommended body in a note: its series and its size."""
+    """A recommended body in words: its series and surface nodes."""
     return f"{body.series}, {body.nodes:,} surface nodes"
 
 
@@ -206,7 +208,7 @@ def _notes(scenes: dict[str, list[Judged]]) -> list[str]:
 
 
 def _left_out(runs: Sequence[Run]) -> list[str]:
-    """What is no point of the chart, and why."""
+    """Notes on the cases that are not in the chart, and why."""
     ended = [f"{run.case.name} {readable(run.record.status)}" for run in runs if run.record.status != Status.OK]
     well = [run for run in runs if run.record.status == Status.OK]
     notes = remarks(well)
@@ -214,7 +216,7 @@ def _left_out(runs: Sequence[Run]) -> list[str]:
         more = f" and {len(ended) - MOST_NAMED} more" if len(ended) > MOST_NAMED else ""
         notes.append(f"Not drawn, because they failed: {', '.join(ended[:MOST_NAMED])}{more}.")
     bodies = [one for group in by_scene(well).values() for one in over_meshes(filter(None, map(judged, group)))]
-    untimed = sum(not one.cost.known for one in bodies)  # of neighbouring meshes one is timed
+    untimed = sum(not one.cost.known for one in bodies)  # of several neighbouring meshes only one is timed
     if untimed:
         notes.append(f"Not drawn (no frame times for this machine and code version): {untimed}.")
     return notes

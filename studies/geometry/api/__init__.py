@@ -1,1 +1,1 @@
-"""Meshes by name: organs, balls, and files of users."""
+"""Meshes by name: organs, balls, and the files of users."""

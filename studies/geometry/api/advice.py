@@ -1,4 +1,4 @@
-"""The doctor's advice, tested before it is given: a command that makes a clean body from the file."""
+"""The advice of the mesh doctor: a command that makes a clean body from the file, tested before it is given."""
 
 import shlex
 import warnings
@@ -16,16 +16,17 @@ NODES = 550
 OPENINGS, FOLDS = 5e-3, 3e-3
 """Values of --solid and --smooth in trials [m]."""
 MOST = 100_000
-"""Triangles up to which advice is tested, which takes seconds."""
+"""Most triangles of a file for which advice is tested; a test takes seconds."""
 BEYOND = {"bad_points", "size", "small", "far_away", "one_sided", "duplicate_tetrahedra"}
 """Findings that no option of the command repairs."""
 
 
 def with_command(source: Source, diagnosis: Findings) -> Findings:
-    """The findings of the file with the command that fixes all of them, and makes a clean body of NODES surface nodes.
+    """The findings of a file and the command that fixes all of them with a clean body of NODES surface nodes.
 
-    Where no command does, each advice names the trials and the nearest one; advice without a trial begins with
-    "try"."""
+    If no trial succeeds, the command is None, and every advice on the mesh command names the trials and the best of
+    them; without trials it begins with "try". A finding on the unit alone is not tested.
+    """
     codes = {finding.code for finding in diagnosis.findings} - {"unit"}
     if not codes:
         return diagnosis
@@ -44,7 +45,10 @@ def with_command(source: Source, diagnosis: Findings) -> Findings:
 
 
 def marked(mend: str, works: bool, attempts: Mapping[str, Findings | None]) -> str:
-    """The advice: as it is where it works, with "try" in front where no trial was made, else with the trials."""
+    """The advice unchanged if a trial `works` or it is no command; with "try" in front without trials; else the trials.
+
+    attempts: options of a trial -> findings of its body, or None if it made none.
+    """
     plain = mend.removeprefix(TRY)
     if works or not plain.startswith(COMMAND):
         return plain
@@ -72,9 +76,9 @@ def ways(codes: set[str]) -> Iterator[dict[str, Any]]:
 
 
 def examined(source: Source, how: dict[str, Any]) -> Findings | None:
-    """The findings of the body that `scan` makes; None where it makes none."""
+    """The findings of the body that `scan` makes; None if it raises StudyError."""
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # the mesh command reports every change
+        warnings.simplefilter("ignore")  # the mesh command repeats these warnings
         try:
             return examine(scan(source, NODES, **how))
         except StudyError:
@@ -82,13 +86,13 @@ def examined(source: Source, how: dict[str, Any]) -> Findings | None:
 
 
 def options(how: dict[str, Any]) -> str:
-    """The same as options of the mesh command: "--nodes 550 --smooth 3"."""
+    """These arguments as options of the mesh command, such as "--nodes 550 --smooth 3"."""
     given = [f"--{key} {1e3 * how[key]:g}" for key in ("smooth", "solid") if key in how]
     return " ".join([f"--nodes {NODES}", *given, *(["--close-holes"] if "holes" in how else [])])
 
 
 def command(source: Source, how: dict[str, Any]) -> str:
-    """The whole mesh command."""
+    """The whole mesh command for a file with these arguments."""
     words = ["organbench", "mesh", "--from", str(source.path)]
     side = None if source.longest_side is None else f"{source.longest_side:g}m"
     given = {"--unit": source.unit, "--scale": None if source.scale == 1.0 else f"{source.scale:g}"}

@@ -1,4 +1,4 @@
-"""The meshes of the project by name, as scenes request them."""
+"""The meshes of the project by name, for scenes."""
 
 import warnings
 from collections.abc import Mapping, Sequence
@@ -22,7 +22,7 @@ from studies.geometry.surface.node_count import FEWEST, MOST
 
 
 class PlaneCut(Protocol):
-    """Where a body is cut: the part `within` of a plane, level = 0 of a half space; None: all of it."""
+    """Where a body is cut: the part of a plane that lies `within` a region."""
 
     @property
     def name(self) -> str:
@@ -31,17 +31,17 @@ class PlaneCut(Protocol):
 
     @property
     def plane(self) -> HalfSpace:
-        """Its front is where the level is positive."""
+        """Half space whose level = 0 is the plane; the level is positive in front of it."""
         ...
 
     @property
     def within(self) -> Region | None:
-        """The blade: level <= 0. A half space has a straight front, a ball a disc inside the body."""
+        """The blade, where level <= 0: a half space has a straight front, a ball a disc; None: the whole section."""
         ...
 
 
 SIDES = ("straight", "curved")
-"""Sides of elements that follow an organ's shape."""
+"""Kinds of element sides for which nodes can be placed."""
 
 
 def organ(
@@ -55,19 +55,19 @@ def organ(
     sides: str | None = None,
     cuts: Sequence[PlaneCut] = (),
 ) -> OrganMesh:
-    """The organ `name` of SHAPES with `nodes` nodes on its outer surface (exactly or within 2 %).
+    """Mesh of the organ `name` of SHAPES with `nodes` nodes on its outer surface, exactly or within 2 % or 5 nodes.
 
-    Outlines of the regions (None: those of the organ) lie on edges. A hollow organ is filled between its surface and
-    its lumen, in `layers` of prisms (None: so many that prisms are as high as long); with fill=False only the outer
-    surface is made. exact: flat sides enclose exactly the organ's volume, with nodes slightly off its surface but
-    outlines on it; else the nodes are on the surface and the volume is 1 to 12 % too small. sides: the kind of sides
-    that are to follow the organ's shape, "straight" or "curved", with nodes placed for it; None: nodes are evenly
-    spread. cuts: they lie on faces of the filled mesh, which is not opened; their sections must not meet. Raises
-    StudyError when the mesher cannot.
+    regions: attachments, whose outlines lie on edges; None: the default ones of the organ. fill: with tetrahedra; else
+    the mesh is the outer surface only. parameters: of the shape function, [m] for the ball and [mm] for the others.
+    layers: of prisms between surface and lumen of a hollow organ; None: so many that prisms are about as high as long.
+    exact: the flat sides enclose the volume of the organ, with nodes slightly off its surface; else the nodes lie on
+    the surface, and the volume is 1 to 12 % too small. sides: "straight" or "curved" places nodes so that sides of this
+    kind follow the shape; None: nodes are evenly spread. cuts: their blades lie on faces of the filled mesh, which is
+    not opened; their sections must not meet. Raises StudyError for an invalid argument and if the mesher fails.
     """
     if isinstance(nodes, bool) or not isinstance(nodes, int | np.integer):
         raise StudyError(f"{name}: {nodes!r} surface nodes asked for; give a whole number such as 550")
-    if not FEWEST <= nodes <= MOST:  # checked here, before the mesher is loaded
+    if not FEWEST <= nodes <= MOST:  # before the mesher is loaded
         raise StudyError(f"{name}: {nodes} surface nodes asked for, but the mesher offers {FEWEST} to {MOST}")
     shape = make_shape(name, parameters or {})
     own = shape.regions if regions is None else regions
@@ -103,9 +103,9 @@ def organ_family(
     parameters: Mapping[str, Any] | None = None,
     layers: int | None = None,
 ) -> list[OrganMesh]:
-    """Meshes of the same shape, attached at the same places, with `sizes` nodes on the outer surface, coarsest first.
+    """Meshes of one shape with the same attachments and `sizes` nodes on the outer surface, coarsest first.
 
-    Raises StudyError for one that cannot be made, and for sizes that do not grow.
+    The other arguments are those of `organ`. Raises StudyError as `organ` does, and for sizes that do not increase.
     """
     if any(b <= a for a, b in pairwise(sizes)):
         raise StudyError(f"{name}: a family of meshes needs growing node counts, not {list(sizes)}")
@@ -113,11 +113,11 @@ def organ_family(
 
 
 def curved(mesh: OrganMesh, may_fold: bool = False, shape: Shape | None = None) -> CurvedMesh:
-    """The filled organ with second-order elements that follow its true shape, its lumen's too; cached.
+    """Second-order mesh of a filled organ, whose sides follow its true shape and that of its lumen; cached.
 
-    The vertices are those of `mesh`, and no element is folded anywhere, unless it `may_fold`. shape: the true shape of
-    a scan, which its recipe does not contain. Raises StudyError for a mesh that is not filled, whose true shape is
-    unknown, or that is too coarse to be curved.
+    The vertices are those of `mesh`. may_fold: whether folded elements are accepted. shape: the true shape of a scan,
+    which its recipe does not contain. Raises StudyError for a mesh that is not filled, whose true shape is unknown, or
+    (unless `may_fold`) that is too coarse to be curved without a fold.
     """
     arrays = {"points": mesh.points, "tetrahedra": mesh.tetrahedra}
     if shape is not None and mesh.recipe["kind"] == "scan":
@@ -138,21 +138,30 @@ def curved(mesh: OrganMesh, may_fold: bool = False, shape: Shape | None = None) 
 def ball(
     nodes: int = 550, radius: float = 0.05, regions: Mapping[str, Region] | None = None, fill: bool = True
 ) -> OrganMesh:
-    """Ball of `radius` [m] around the origin; surface nodes lie exactly on the sphere, so the volume is a little small
-    (1 % at 550 nodes); raises StudyError for a radius or node count that cannot be meshed."""
+    """Ball of `radius` [m] around the origin with `nodes` surface nodes; fill: with tetrahedra.
+
+    The surface nodes lie on the sphere, so the volume is a little too small (1 % at 550 nodes). regions: attachments;
+    None: none. Raises StudyError for a radius or node count that cannot be meshed.
+    """
     return organ("ball", nodes, regions or {}, fill, {"radius": float(radius)})
 
 
 def liver(nodes: int = 550, regions: Mapping[str, Region] | None = None, fill: bool = True) -> OrganMesh:
-    """Liver of about 1,500 mL, x to the patient's left, y to the back, z to the head; attached at LIVER_REGIONS unless
-    other regions are given; raises StudyError for a node count that cannot be meshed."""
+    """Liver of about 1,500 mL with `nodes` surface nodes; x to the patient's left, y to the back, z to the head.
+
+    regions: attachments; None: LIVER_REGIONS. fill: with tetrahedra. Raises StudyError for a node count that cannot be
+    meshed.
+    """
     return organ("liver", nodes, regions, fill)
 
 
 def ball_octant(radius: float, h: float, h_pole: float) -> OrganMesh:
-    """Octant x, y, z >= 0 of a ball [m], element size `h_pole` [m] at the pole (0, 0, radius) growing to `h` [m] one
-    radius away. Patches: "x0", "y0", "z0" (exactly coordinate 0) and "sphere". Raises StudyError for sizes outside
-    0.005 to 1 of the radius."""
+    """Octant x, y, z >= 0 of a ball of `radius` [m] around the origin, filled.
+
+    The element size grows from `h_pole` [m] at the pole (0, 0, radius) to `h` [m] at a distance of one radius. Patches:
+    "x0", "y0", "z0", whose coordinate is exactly 0, and "sphere". Raises StudyError for sizes outside 0.005 to 1 of the
+    radius.
+    """
     for name, size in (("h", h), ("h_pole", h_pole)):
         if not 0.005 * radius <= size <= radius:
             raise StudyError(
@@ -173,10 +182,10 @@ def ball_octant(radius: float, h: float, h_pole: float) -> OrganMesh:
 
 
 def fill(surface: OrganMesh, limit: float = TIME_LIMIT) -> OrganMesh:
-    """The given closed surface filled with tetrahedra, its nodes kept bit for bit and numbered first.
+    """A closed surface filled with tetrahedra; its nodes stay the same bit for bit and are numbered first.
 
-    Gives up after `limit` seconds. Raises StudyError for a surface that is not closed, outward and well shaped, or that
-    cannot be filled (it cuts itself).
+    limit: processor time [s]. Warns of a dihedral angle below MIN_DIHEDRAL. Raises StudyError for a surface that is not
+    one closed, outward part without slivers, that intersects itself, or that cannot be filled within the limit.
     """
     points = np.ascontiguousarray(surface.points[: surface.surface_count], dtype=float)
     triangles = np.ascontiguousarray(surface.triangles, dtype=np.int64)
@@ -200,9 +209,10 @@ def fill(surface: OrganMesh, limit: float = TIME_LIMIT) -> OrganMesh:
 
 
 def attach(mesh: OrganMesh, regions: Mapping[str, Region]) -> OrganMesh:
-    """The mesh with the surface nodes inside the regions as patches, for a file's own triangles.
+    """The mesh with patches: the outer surface nodes that lie in each region. For the triangles of a file as they are.
 
-    No node moves, so the outline is a staircase of its edges. Raises StudyError for a region without nodes.
+    No node moves, so the outline of a patch is a staircase of edges. Raises StudyError for a region without nodes, and
+    for one that is not of a known kind.
     """
     data = {key: region_to_dict(region) for key, region in regions.items()}
     return replace(mesh, patches=patches_of(mesh, data), recipe=mesh.recipe | {"regions": data})

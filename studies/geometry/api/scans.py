@@ -1,4 +1,4 @@
-"""Real organs: from a surface in a file to a mesh of a wanted number of nodes."""
+"""Real organs: from a surface in a file to a mesh with a chosen number of nodes."""
 
 import warnings
 from collections.abc import Mapping
@@ -35,29 +35,33 @@ from studies.geometry.surface.painted import painted_region
 from studies.geometry.surface.repair import RepairedSurface, border, mend
 
 LEVEL_KEYS = ("name", "solid", "smooth")
-"""Keys of a recipe on which the true shape depends, besides the surface itself."""
+"""Keys of a recipe on which the true shape depends, in addition to the surface."""
 
 
 @dataclass(frozen=True)
 class Remeshing:
-    """Operations on the surface of a file before meshing; lengths in metres."""
+    """Operations on the surface of a file before it is meshed; lengths in [m]."""
 
     smooth: float = 0.0
-    """Folds are closed and bumps are smoothed up to about this size, see scan_shape; needs a number of nodes."""
+    """Size up to which folds are closed and bumps are smoothed (scan_shape.levelled); needs a number of nodes."""
     holes: bool = False
-    """Borders are closed with flat lids first."""
+    """Whether borders are closed first, each by a fan of triangles over the mean of its nodes."""
     solid: float | None = None
-    """The interior of the surface is filled, with openings up to this width closed; for capsules and double walls."""
+    """The body is what the surface encloses when openings up to this width are closed, for capsules and double walls;
+    needs a number of nodes."""
     wall: float | None = None
     """Thickness of the wall of a hollow organ; needs a number of nodes."""
     layers: int | None = None
-    """Layers of elements in the wall."""
+    """Layers of prisms in the wall; None: so many that the prisms are about as high as long."""
     on_shape: bool = False
-    """Nodes lie on the true shape, for sides that are curved onto it (true_shape_of); else flat sides enclose the
-    volume."""
+    """Whether nodes lie on the true shape (true_shape_of), for sides that are curved onto it later; else the flat sides
+    enclose the volume."""
 
     def check(self, name: str) -> None:
-        """Raise StudyError unless the lengths are such; name: of the file."""
+        """Raise StudyError unless `smooth` and `solid` are finite and >= 0 and `wall` is finite and above 0.
+
+        name: of the file.
+        """
         if not 0 <= self.smooth < np.inf:
             raise StudyError(f"{name}: smoothing over {1e3 * self.smooth:g} mm asked for; give 0 or a few millimetres")
         if self.solid is not None and not 0 <= self.solid < np.inf:
@@ -67,7 +71,8 @@ class Remeshing:
             raise StudyError(f"{name}: a wall of {1e3 * self.wall:g} mm asked for; give a thickness above 0")
 
     def check_count(self, nodes: int | None, name: str) -> None:
-        """Raise StudyError unless `nodes` is a whole number, or None and the triangles of the file can stay."""
+        """Raise StudyError unless `nodes` is a whole number, or None without smooth, wall and solid; name: of the
+        file."""
         if nodes is None and (self.smooth or self.wall is not None or self.solid is not None):
             raise StudyError(
                 f"{name}: smoothing, a wall and a filled shell need a new surface; set its number of nodes (--nodes)"
@@ -77,7 +82,7 @@ class Remeshing:
 
     @property
     def recipe(self) -> dict[str, Any]:
-        """What of it decides a remeshed body, JSON-able."""
+        """The fields that change a remeshed body, except `holes`; JSON-able."""
         thickness = {} if self.wall is None else {"wall": float(self.wall)}
         count = {} if self.wall is None or self.layers is None else {"layers": int(self.layers)}
         on = {"on_shape": True} if self.on_shape else {}
@@ -94,14 +99,15 @@ def scan(
     regions: Mapping[str, Region] | None = None,
     **how: Any,
 ) -> OrganMesh:
-    """A body from the surface in a file: welded, its largest part kept, oriented, and remeshed to `nodes` nodes.
+    """A body from the surface in a file, which is welded, reduced to its largest part, oriented and remeshed.
 
-    path: a file, or a Source, which also has a scale or a part. nodes: None keeps the file's own triangles. unit: of
-    the file, one of UNITS; None: that stated in the file, or metres if only these give the size of an organ. fill: with
-    tetrahedra. regions: attachments; with `nodes` their outlines lie on edges; None: those painted in the file, its
-    point data `patch_NAME`. how: the fields of Remeshing. With `nodes` the mesh has the volume of the surface, and
-    `losses` states its deviation from the file. Warns of every change to the surface. Raises StudyError for a file that
-    cannot be read, repaired or meshed, TypeError for an unknown field.
+    path: a file, or a Source, which also has a scale or a part. nodes: on the outer surface; None keeps the triangles
+    of the file. unit: of the file, one of UNITS; None: the one that the file states, or metres if only metres give the
+    size of an organ. fill: with tetrahedra. regions: attachments, whose outlines lie on edges if `nodes` is given;
+    None: those painted in the file as point data `patch_NAME`. how: the fields of Remeshing. With `nodes`, `losses`
+    states how far the mesh deviates from the file, and unless `on_shape` the mesh has the volume of the surface. Warns
+    of every change to the surface. Raises StudyError for a file that cannot be read, repaired or meshed, and TypeError
+    for an unknown field.
     """
     source, remeshing = as_source(path, unit), Remeshing(**how)
     name, content = source.path.name, opened(source)
@@ -128,15 +134,18 @@ def scan(
 
 
 def painted(path: str | Path | Source, name: str, unit: str | None = None) -> PaintedRegion:
-    """The region painted on the surface in a file, whose point data `patch_NAME` are above 0 there: for every mesh of
-    the organ, by either solver. path, unit: as of `scan`. Raises StudyError for a file that cannot be read, or without
-    such data, or with all of its nodes on one side."""
+    """The region painted on the surface in a file, where the point data `patch_NAME` are above 0.
+
+    It is the same for every mesh of the organ and for both solvers. name: without the prefix. path, unit: as in `scan`.
+    Raises StudyError for a file that cannot be read, that has no such data, or whose nodes are all inside or all
+    outside.
+    """
     source = as_source(path, unit)
     return painted_on(source, opened(source), name)
 
 
 def painted_on(source: Source, content: Content, name: str) -> PaintedRegion:
-    """The same of a file that is open."""
+    """The same as `painted` for a file whose content is read."""
     marked, file = marked_nodes(content), source.path.name
     if name not in marked:
         patches = f"the patches {', '.join(marked)}" if marked else "no point data called patch_NAME"
@@ -145,11 +154,15 @@ def painted_on(source: Source, content: Content, name: str) -> PaintedRegion:
 
 
 def true_shape_of(source: Source, **how: Any) -> Shape:
-    """The true shape of the surface in a file, the same for meshes of any number of nodes; it has the volume of the
-    surface. how: the fields of Remeshing. Raises StudyError for what cannot be read or repaired."""
+    """The true shape of the surface in a file, the same for meshes of any number of nodes.
+
+    It has the volume of the surface, unless parts of the surface overlap or are lost (true_grid.target_volume). how:
+    the fields of Remeshing. Raises StudyError for a file that cannot be read or repaired, and TypeError for an unknown
+    field.
+    """
     remeshing, name = Remeshing(**how), source.path.name
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # meshing the shape warns of every change
+        warnings.simplefilter("ignore")  # `scan` warns of every change
         surface, recipe = repaired_surface(source, opened(source), remeshing)
     if remeshing.solid is None:
         check_watertight(surface, name)
@@ -159,16 +172,19 @@ def true_shape_of(source: Source, **how: Any) -> Shape:
 
 
 def level_arrays(recipe: Mapping[str, Any], surface: RepairedSurface) -> dict[str, np.ndarray]:
-    """The grid of the true shape of a repaired surface; recipe: of a scan."""
+    """The grid of the true shape of a repaired surface, as arrays (jobs.LEVEL); recipe: of a scan."""
     deciding = {key: recipe[key] for key in LEVEL_KEYS if key in recipe} | {"kind": "level"}
     return level_of(deciding, {"points": surface.points, "triangles": surface.triangles})
 
 
 def repaired_surface(source: Source, content: Content, remeshing: Remeshing) -> tuple[RepairedSurface, dict[str, Any]]:
-    """The surface of a file, welded and repaired, and the recipe of the file. Warns of every change."""
+    """The surface of a file [m], welded and (without `solid`) repaired, and the recipe of the file.
+
+    Warns of every change. Raises StudyError for a surface that cannot be repaired or has the size of no organ.
+    """
     path = source.path
     welded = weld(*in_metres(source, content))
-    # What a shell encloses needs no closed surface, and all parts of it.
+    # `solid` needs all parts of the surface, which may be open.
     surface = mend(*welded, path.name, remeshing.holes) if remeshing.solid is None else RepairedSurface(*welded, ())
     for sentence in surface.remarks:
         warnings.warn(f"{path.name}: {sentence}", stacklevel=3)
@@ -178,22 +194,25 @@ def repaired_surface(source: Source, content: Content, remeshing: Remeshing) -> 
 
 
 def raw_surface(path: Path) -> tuple[np.ndarray, np.ndarray]:
-    """Points (n, 3) in the file's unit and triangles (t, 3): of the surface, or the boundary of the tetrahedra.
+    """Points (n, 3) in the unit of the file and triangles (t, 3) of its surface, or of the boundary of its tetrahedra.
 
-    Raises StudyError for a file without them or with coordinates that are not finite.
+    Raises StudyError for a file without cells or with coordinates that are not finite.
     """
     return surface_of(opened(Source(path)), path.name)
 
 
 def surface_of(content: Content, name: str) -> tuple[np.ndarray, np.ndarray]:
-    """Points and triangles of what a file holds; see raw_surface."""
+    """Points and triangles of the content of a file, as in raw_surface; name: of the file."""
     check_finite(content.points, name)
     solid = len(content.tetrahedra) > 0
     return content.points, boundary_triangles(content.tetrahedra) if solid else content.triangles
 
 
 def in_metres(source: Source, content: Content) -> tuple[np.ndarray, np.ndarray]:
-    """Points (n, 3) [m] and triangles (t, 3). Raises StudyError for no organ's size."""
+    """Points (n, 3) [m] and triangles (t, 3) of the surface of a file.
+
+    Raises StudyError for a size that no organ has, for a body too far from the origin, and if the unit is unknown.
+    """
     name = source.path.name
     points, triangles = surface_of(content, name)
     metres = source.metres(content.longest_side, content.unit)
@@ -208,7 +227,7 @@ def in_metres(source: Source, content: Content) -> tuple[np.ndarray, np.ndarray]
 
 
 def as_it_is(surface: RepairedSurface, recipe: dict[str, Any], fill: bool) -> OrganMesh:
-    """The repaired surface with the file's own triangles, filled when asked."""
+    """The repaired surface with the triangles of the file; fill: with tetrahedra. Raises StudyError if it is unfit."""
     check_surface(surface.points, surface.triangles, recipe["file"])
     check_one_part(surface.triangles, recipe["file"])
     check_amount(signed_volume(surface.points, surface.triangles), recipe["file"])
@@ -218,7 +237,7 @@ def as_it_is(surface: RepairedSurface, recipe: dict[str, Any], fill: bool) -> Or
 
 
 def check_watertight(surface: RepairedSurface, name: str) -> None:
-    """Raise StudyError unless the surface has an inside: no border, and a volume."""
+    """Raise StudyError unless the surface is closed and encloses the volume of an organ."""
     left = len(border(surface.triangles))
     if left:
         raise StudyError(f"{name}: the surface is open at {left} edges; close the holes (--close-holes)")
@@ -227,7 +246,7 @@ def check_watertight(surface: RepairedSurface, name: str) -> None:
 
 
 def check_amount(volume: float, name: str) -> None:
-    """Raise StudyError for a volume [m³] below that of any organ."""
+    """Raise StudyError for a volume [m³] that is smaller than that of any organ."""
     if abs(volume) < LEAST_VOLUME:
         raise StudyError(
             f"{name}: the surface encloses {1e6 * volume:.2g} mL, and no organ is smaller than 1 mL; correct the unit "

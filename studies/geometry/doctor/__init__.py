@@ -1,1 +1,1 @@
-"""Faults of a mesh, and the option that fixes each."""
+"""The mesh doctor: measures of a mesh, its faults, and the option that repairs each."""

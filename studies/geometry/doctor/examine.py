@@ -1,4 +1,4 @@
-"""The mesh doctor: what is wrong with a mesh, how much of it, and what fixes it."""
+"""The mesh doctor: finds the faults of a mesh, counts them, and names what repairs them."""
 
 import warnings
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ from studies.geometry.files.units import UNITS, Source, as_source, check_range, 
 from studies.geometry.mesh.organ_mesh import OrganMesh, boundary_triangles
 
 TISSUE = 1800.0, 1060.0
-"""Shear modulus [Pa] and density [kg/m^3] for the time step when none are given: a liver's."""
+"""Default shear modulus [Pa] and density [kg/m^3] for the time step: those of a liver."""
 
 
 @dataclass(frozen=True)
@@ -29,7 +29,8 @@ class Findings:
     """Numbers by name, SI units, JSON-able; docs/meshes.md has the list."""
     findings: tuple[Finding, ...]
     command: str | None = None
-    """A command line that repairs everything, as a trial showed (studies.geometry.api.advice); None where none does."""
+    """A command line that repairs everything, as a trial has shown (studies.geometry.api.advice); None if there is
+    none, or before the trials."""
 
     @property
     def clean(self) -> bool:
@@ -49,9 +50,9 @@ def examine(
 ) -> Findings:
     """The measures and faults of a mesh file or an OrganMesh.
 
-    source: a Source may also have a scale or a part. unit: of the file, one of UNITS; None: the numbers use the likely
-    one, and that is a finding. tissue: shear modulus [Pa] and density [kg/m^3] for the time step. Raises StudyError
-    for a file that holds no mesh, or one of an impossible size.
+    source: a Source may also have a scale or a part. unit: of the file, one of UNITS; None: the one that the file
+    states, else the most likely one, which is a finding unless only metres are likely. tissue: shear modulus [Pa] and
+    density [kg/m^3] for the time step. Raises StudyError for a file without a mesh or with an impossible size.
     """
     if isinstance(source, OrganMesh):
         cells = source.tetrahedra if len(source.tetrahedra) else source.triangles
@@ -60,7 +61,7 @@ def examine(
     content = opened(file)
     used, metres = unit_of(file, content)
     check_range(content.longest_side * metres, file.path.name)
-    # An STL file repeats the corners of every triangle: nothing to report.
+    # An STL file repeats the corners of every triangle, which is no fault.
     repeats = file.path.suffix.lower() == ".stl"
     welding = describe_welding(content.points, content.cells, repeats)
     welding["part_list"] = [] if welding["bad_points"] else [row_of(part, metres) for part in parts_in(content)]
@@ -70,11 +71,11 @@ def examine(
 
 
 def unit_of(source: Source, content: Content) -> tuple[dict[str, Any], float]:
-    """The unit and whether it is certain, as measures, and metres per unit of the file."""
+    """The measures "unit" and "unit_said" (whether the unit is certain), and metres per unit of the file."""
     side = source.scale * content.longest_side
     explicit = source.unit or content.unit
     likely = likely_units(side)
-    # The smallest unit that makes an organ of the points, for showing numbers only.
+    # The smallest unit that gives the size of an organ; it serves to show numbers only.
     unit = explicit or ("m" if source.longest_side is not None else (likely or ["m"])[-1])
     certain = explicit is not None or source.longest_side is not None or likely == ["m"]
     metres = source.metres(content.longest_side, unit) if certain else source.scale * UNITS[unit]
@@ -82,7 +83,7 @@ def unit_of(source: Source, content: Content) -> tuple[dict[str, Any], float]:
 
 
 def row_of(part: Part, metres: float) -> dict[str, Any]:
-    """A part in metres, JSON-able."""
+    """A part as a JSON-able row, with its size [m]; metres: per unit of the file."""
     size = [metres * side for side in part.size]
     return {"number": part.number, "name": part.name, "triangles": part.triangles, "size": size}
 
@@ -90,9 +91,9 @@ def row_of(part: Part, metres: float) -> dict[str, Any]:
 def examine_cells(
     name: str, points: np.ndarray, cells: np.ndarray, file_measures: dict[str, Any], tissue: tuple[float, float]
 ) -> Findings:
-    """Findings about points (n, 3) [m] and triangles (t, 3) or tetrahedra (k, 4).
+    """Measures and faults of points (n, 3) [m] and triangles (t, 3) or tetrahedra (k, 4).
 
-    file_measures: those of the file, which come first.
+    file_measures: measures of the file, which are added. Of points that are not finite nothing else is measured.
     """
     solid = cells.shape[1] == 4
     measures: dict[str, Any] = {"kind": "tetrahedra" if solid else "surface", "part_list": [], **file_measures}

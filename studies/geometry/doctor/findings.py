@@ -1,4 +1,4 @@
-"""The findings of the mesh doctor: for each one a plain sentence and the option that fixes it."""
+"""The findings of the mesh doctor: for each one a sentence and the option that repairs it."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -8,26 +8,27 @@ from studies.geometry.files.units import FAR_AWAY, LEAST_VOLUME, UNITS, likely_u
 from studies.geometry.mesh.quality import MIN_DIHEDRAL
 
 POOR_TRIANGLE = 0.1
-"""Radius ratio of a triangle under which springs on it are stiff and the fill gets slivers."""
+"""Radius ratio of a triangle below which springs on it are stiff and the fill gets slivers."""
 
 SHELL = 0.02
-"""Thickness 2 V / A over the diagonal under which a closed surface is a shell and no body; a ball has 0.19."""
+"""Thickness 2 V / A over the diagonal below which a closed surface is a shell and no body; a ball has 0.19."""
 TRY, COMMAND = "try ", "organbench mesh"
-"""Beginnings of advice that may fail, and of advice on a command."""
+"""First words of advice that may fail, and of advice to use the mesh command."""
 REMESH = "try organbench mesh --from FILE --nodes N: it makes a new, even surface"
 EXPORT = "export the file again from the program that made it"
 
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing that is wrong."""
+    """One kind of fault of a mesh."""
 
     code: str
-    """Stable name, for machines."""
+    """Stable name, for programs."""
     count: int
-    """How many of it."""
+    """How often the fault occurs."""
     sentence: str
     mend: str
+    """Advice on the repair."""
 
 
 Rule = tuple[str, Callable[[dict[str, Any]], int], Callable[[dict[str, Any]], str], str]
@@ -38,7 +39,7 @@ def _number(name: str) -> Callable[[dict[str, Any]], int]:
 
 
 def _poor(name: str, key: str, limit: float) -> Callable[[dict[str, Any]], int]:
-    """1 when the worst of a spread is under the limit."""
+    """Count of a rule: 1 if the value `key` of the spread `name` is below the limit, else 0."""
     return lambda m: int(bool(m.get(name)) and m[name][key] < limit)
 
 
@@ -246,6 +247,6 @@ RULES: tuple[Rule, ...] = (
 
 
 def findings_of(measures: dict[str, Any]) -> tuple[Finding, ...]:
-    """Everything that is wrong, the gravest first as far as mending goes."""
+    """All findings from the measures, in the order of RULES."""
     rows = [(code, count(measures), sentence, mend) for code, count, sentence, mend in RULES]
     return tuple(Finding(code, int(n), sentence(measures), mend) for code, n, sentence, mend in rows if n)

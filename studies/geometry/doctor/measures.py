@@ -1,4 +1,4 @@
-"""The numbers of the mesh doctor."""
+"""The measures of the mesh doctor."""
 
 from typing import Any
 
@@ -17,14 +17,18 @@ from studies.geometry.surface.intersections import crossing_triangles
 from studies.geometry.surface.repair import border, edge_pairs, oriented, part_of, without_repeats
 
 MEASURED_BODY = 6000
-"""Nodes up to which the largest frequency of the springs is computed (seconds); above it is estimated."""
+"""Most nodes of a body for which the largest frequency of the springs is computed, which takes seconds; beyond, the
+time step is estimated."""
 
 RIM = 500
-"""Nodes of a border between which distances are measured: more are thinned out evenly."""
+"""Most nodes of a border between which distances are measured; of more, every k-th is taken."""
 
 
 def describe_welding(points: np.ndarray, cells: np.ndarray, repeats: bool) -> dict[str, Any]:
-    """Points of a file, before they are welded: how many are not finite, double or unused."""
+    """Numbers of points in a file before welding: not finite, in all, unused, and duplicate.
+
+    repeats: whether the format repeats points, which then do not count as duplicates.
+    """
     bad = int((~np.isfinite(points).all(axis=1)).sum())
     measures: dict[str, Any] = {"bad_points": bad, "points_in_file": len(points)}
     used = len(np.unique(cells))
@@ -34,7 +38,7 @@ def describe_welding(points: np.ndarray, cells: np.ndarray, repeats: bool) -> di
 
 
 def describe_surface(points: np.ndarray, triangles: np.ndarray) -> dict[str, Any]:
-    """Topology, orientation, size and quality of welded triangles (t, 3) on points (n, 3) [m], by name."""
+    """Measures of welded triangles (t, 3) on points (n, 3) [m]: topology, orientation, size and quality."""
     sound = without_repeats(triangles)
     rows = np.sort(triangles, axis=1)
     collapsed = int((rows[:, 1:] == rows[:, :-1]).any(axis=1).sum())
@@ -50,7 +54,7 @@ def describe_surface(points: np.ndarray, triangles: np.ndarray) -> dict[str, Any
 
 
 def describe_edges(triangles: np.ndarray) -> dict[str, Any]:
-    """How the triangles are connected: open, crowded and disagreeing edges, holes, pinched nodes."""
+    """Measures of the connections of triangles (t, 3): open, crowded and disagreeing edges, holes, pinched nodes."""
     half = triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
     _, counts = np.unique(np.sort(half, axis=1), axis=0, return_counts=True)
     _, agree = edge_pairs(triangles)
@@ -75,12 +79,12 @@ def describe_edges(triangles: np.ndarray) -> dict[str, Any]:
 
 
 def hole_count(triangles: np.ndarray) -> int:
-    """Number of connected borders."""
+    """Number of connected borders of triangles (t, 3)."""
     return len(set(borders(triangles)[1]))
 
 
 def borders(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Nodes on borders (n,), and for each the number of the border that it belongs to (n,)."""
+    """Nodes on borders (n,), and the number of the border of each (n,)."""
     nodes, local = np.unique(border(triangles), return_inverse=True)
     i, j = local.reshape(-1, 2).T
     graph = coo_array((np.ones(len(i)), (i, j)), shape=(len(nodes), len(nodes)))
@@ -88,7 +92,7 @@ def borders(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def hole_list(points: np.ndarray, triangles: np.ndarray) -> list[dict[str, Any]]:
-    """Of each hole, the widest first: width [m], the largest distance between nodes of its border, and middle [m]."""
+    """Width and middle [m] of each hole, the widest first; the width is the largest distance between border nodes."""
     nodes, number = borders(triangles)
     rims = [points[nodes[number == k]] for k in range(number.max() + 1)]
     thinned = [rim[:: -(-len(rim) // RIM)] for rim in rims]
@@ -100,9 +104,10 @@ def hole_list(points: np.ndarray, triangles: np.ndarray) -> list[dict[str, Any]]
 
 
 def describe_parts(points: np.ndarray, triangles: np.ndarray, surface: dict[str, Any]) -> dict[str, Any]:
-    """Separate parts, lumens among them, inside-out ones, and handles. surface: measures of `describe_edges`.
+    """Numbers of separate parts, lumens, inverted parts, and handles ("genus"); surface: measures of `describe_edges`.
 
-    A part that looks inwards inside the box of the largest one bounds a lumen.
+    An inverted part inside the box of the largest part bounds a lumen. Lumens and inverted parts are counted only for
+    closed, oriented surfaces, handles only if the surface is also manifold.
     """
     parts = part_of(triangles)
     pieces = [triangles[parts == k] for k in range(int(parts.max()) + 1)] if len(parts) else []
@@ -122,7 +127,7 @@ def describe_parts(points: np.ndarray, triangles: np.ndarray, surface: dict[str,
 
 
 def describe_size(points: np.ndarray, triangles: np.ndarray) -> dict[str, Any]:
-    """Box, area, volume [m, m^2, m^3], edges and the shape of the triangles."""
+    """Box, distance from the origin, edges and thickness [m], area [m^2], volume [m^3], and quality of triangles."""
     used = points[np.unique(triangles)]
     size = np.ptp(used, axis=0) if len(used) else np.zeros(3)
     edges = unique_edges(triangles)
@@ -144,7 +149,7 @@ def describe_size(points: np.ndarray, triangles: np.ndarray) -> dict[str, Any]:
 
 
 def describe_tetrahedra(points: np.ndarray, tetrahedra: np.ndarray) -> dict[str, Any]:
-    """Number, volume and shape of the tetrahedra (k, 4)."""
+    """Numbers, volume [m^3] and quality of tetrahedra (k, 4) on points (n, 3) [m]; angles in degrees."""
     ratio = tetrahedron_radius_ratio(points, tetrahedra)
     distinct = np.unique(np.sort(tetrahedra, axis=1), axis=0)
     return {
@@ -160,7 +165,7 @@ def describe_tetrahedra(points: np.ndarray, tetrahedra: np.ndarray) -> dict[str,
 
 
 def spread(values: np.ndarray) -> dict[str, float] | None:
-    """Smallest value, first and fifth percentile, median and largest; None without values."""
+    """Minimum, 1st, 5th and 50th percentile and maximum of values (n,); None without values."""
     if not len(values):
         return None
     least, first, fifth, half, most = np.percentile(values, [0, 1, 5, 50, 100])
@@ -174,11 +179,12 @@ def describe_springs(
     surface: dict[str, Any],
     tissue: tuple[float, float],
 ) -> dict[str, Any]:
-    """Shortest edge [m] and the largest stable time step [s] of springs on this mesh (docs/theory.md, eq. 5.2).
+    """Shortest edge [m] of the surface and largest stable time step [s] of springs on the mesh (docs/theory.md,
+    eq. 5.2, undamped).
 
-    surface: measures of `describe_surface`; tissue: shear modulus [Pa] and density [kg/m^3].
-    The step follows from the largest frequency of a body where one can be made and is not too large ("measured"), else
-    it is the time in which a wave in a Cauchy solid, E = 2.5 mu, crosses the shortest edge ("estimated").
+    surface: measures of `describe_surface`; tissue: shear modulus [Pa] and density [kg/m^3]. The step follows from the
+    largest frequency of the body, if one can be made with up to MEASURED_BODY nodes ("measured"). Else it is the time
+    in which a wave in a Cauchy solid, E = 2.5 mu, crosses the shortest edge ("estimated").
     """
     modulus, density = tissue
     material = Material(modulus, density)

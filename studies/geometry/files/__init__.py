@@ -1,1 +1,1 @@
-"""Mesh files, read and written; meshio is called here only."""
+"""Reads and writes mesh files."""

@@ -16,11 +16,11 @@ class Content:
     points: shape (n, 3)
     triangles: shape (t, 3)
     tetrahedra: shape (k, 4)
-    point_data: name -> one row of values per point
-    names: parts that the file names, in its order; empty where it names none
-    part: of each triangle the index into `names`, shape (t,); empty where the file names none
-    unit: what the file's format or its header says, or None
-    unit_by_custom: whether the header states no unit, so that the usual one of the format is assumed
+    point_data: name -> values, one row per point
+    names: names of the parts in the order of the file; empty if it has none
+    part: index into `names` of each triangle, shape (t,); empty if the file has no names
+    unit: the unit that the header or the format defines, or the usual one of the format; None if it is unknown
+    unit_by_custom: whether `unit` is only the usual one of the format, because the header states none
     """
 
     points: np.ndarray
@@ -34,25 +34,31 @@ class Content:
 
     @property
     def cells(self) -> np.ndarray:
-        """The tetrahedra where there are any, else the triangles."""
+        """The tetrahedra (k, 4) if there are any, else the triangles (t, 3)."""
         return self.tetrahedra if len(self.tetrahedra) else self.triangles
 
     @property
     def longest_side(self) -> float:
-        """Of the box around the finite points that a cell uses, in the file's unit; 0 where there are none."""
+        """Longest side of the box around the finite points of the cells, in the unit of the file; 0 without points.
+
+        If a cell uses a point that does not exist, all finite points count.
+        """
         used = self.points[np.unique(self.cells)] if self.has_all_points else self.points
         finite = used[np.isfinite(used).all(axis=1)]
-        # Halved before the difference: coordinates may be as large as numbers get.
+        # Halved before the difference, which could overflow.
         return 2.0 * float(np.ptp(finite / 2.0, axis=0).max()) if len(finite) else 0.0
 
     @property
     def has_all_points(self) -> bool:
-        """Whether no cell names a point that is not there."""
+        """Whether all points that cells use exist."""
         return bool(self.cells.min(initial=0) >= 0 and self.cells.max(initial=-1) < len(self.points))
 
 
 def check_content(content: Content, name: str) -> Content:
-    """The content, if it has cells whose points are there, with three coordinates each; else raises StudyError."""
+    """The content unchanged; name: of the file.
+
+    Raises StudyError unless it has cells, all their points exist, and points have three coordinates.
+    """
     points = content.points
     if not points.size:
         raise StudyError(f"{name}: the file has no points; export a surface or a volume mesh")
@@ -69,7 +75,7 @@ def check_content(content: Content, name: str) -> Content:
 
 
 def fans(polygons: np.ndarray) -> np.ndarray:
-    """Triangles (k (m - 2), 3) of convex polygons (k, m), each a fan from its first corner."""
+    """Triangles (k (m - 2), 3) of convex polygons (k, m): each polygon becomes a fan from its first corner."""
     corners = polygons.shape[1]
     return np.concatenate(
         [np.empty((0, 3), np.int64), *(polygons[:, [0, k, k + 1]] for k in range(1, corners - 1))]

@@ -6,18 +6,18 @@ from pathlib import Path
 from studies.base.errors import StudyError
 
 LARGE = 2_000_000
-"""Triangles from which the user is asked first: minutes of work and gigabytes of memory."""
+"""Number of triangles from which on the user is asked first: they take minutes and gigabytes of memory."""
 BYTES = {".stl": 270.0, ".obj": 50.0, ".off": 45.0, ".ply": 45.0, ".vtk": 45.0, ".vtu": 35.0, ".msh": 55.0}
 """Bytes per triangle in a text file, including its share of the points."""
 SECONDS, GIGABYTES = 30.0, 2.3
-"""For a million triangles: to weld, check and measure them on one core, and the memory that takes (from 200,000)."""
+"""Time [s] and memory [GB] to weld, check and measure a million triangles on one core; valid from 200,000 on."""
 HEADER = 84
 PER_TRIANGLE = 50
 HEAD = 4096
 
 
 def triangle_count(path: Path) -> int:
-    """Number of triangles in a file, from its header if that states it, else from its size."""
+    """Number of triangles in a file: from the header of a binary STL or a PLY file, else estimated from its size."""
     size = path.stat().st_size
     with open(path, "rb") as file:
         head = file.read(HEAD)
@@ -28,12 +28,12 @@ def triangle_count(path: Path) -> int:
 
 
 def is_ascii_stl(head: bytes) -> bool:
-    """Whether a file that begins like this is a text STL; binary ones may begin with "solid" too."""
+    """Whether a file with this beginning is a text STL; a binary STL may begin with "solid" as well."""
     return head.lstrip().startswith(b"solid") and (b"facet" in head or b"endsolid" in head)
 
 
 def is_text(head: bytes) -> bool:
-    """Whether all bytes are printable ones or white space."""
+    """Whether all bytes are printable ASCII characters or white space."""
     return all(byte >= ord(" ") or chr(byte).isspace() for byte in head) and max(head, default=0) < 0x80
 
 
@@ -48,7 +48,7 @@ def check_whole(path: Path) -> None:
         return
     count = int.from_bytes(head[80:84], "little")
     promised = HEADER + PER_TRIANGLE * count
-    # Text that is no STL at all has letters where the count is.
+    # A text that is no STL has letters in the place of the count.
     if size < promised and not is_text(head[:HEADER]):
         raise StudyError(
             f"{path.name} is cut short: its header promises {count:,} triangles in {promised:,} bytes, "
@@ -57,7 +57,7 @@ def check_whole(path: Path) -> None:
 
 
 def size_warning(path: Path) -> str | None:
-    """A warning for the user before a large file is read; None for a small one."""
+    """A warning for the user before a file of LARGE triangles or more is read; None for a smaller file."""
     count = triangle_count(path)
     if count < LARGE:
         return None

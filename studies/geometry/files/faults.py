@@ -1,4 +1,4 @@
-"""Messages for files that cannot be read, so that users need not understand the errors of readers."""
+"""Messages for files that cannot be read, in place of the errors of the readers."""
 
 import gzip
 import lzma
@@ -12,9 +12,9 @@ from studies.base.errors import StudyError
 from studies.geometry.files.estimate import HEADER, check_whole, is_ascii_stl, is_text
 
 FORMATS = "STL, PLY, OBJ, OFF, VTK, VTU, VTP, MSH, glTF, or a label mask in NIfTI or NRRD"
-"""What can be given instead."""
+"""Formats that can be read, for messages."""
 HEAD = 65_536
-"""Bytes in which a header stands."""
+"""Bytes from the start of a file that are searched for a header."""
 OTHER_KINDS = {
     b"\x89PNG": "a PNG picture",
     b"\xff\xd8\xff": "a JPEG picture",
@@ -35,7 +35,7 @@ NO_STL = {
     b"$MeshFormat": "an MSH file",
     b"glTF": "a glTF file",
 }
-"""First bytes of meshes that are sometimes called .stl."""
+"""First bytes of other mesh formats that occur in files called .stl."""
 COMMA = rb"^\s*(?:vertex|facet normal)\b[^\n]*?[-+0-9],\d[^\n]*"
 """A line of a text STL with a decimal comma."""
 PACKED = b"\x1f\x8b"
@@ -47,15 +47,15 @@ PROMISES = {
     ".vtp": rb'NumberOf(Points|Polys)\s*=\s*"(\d+)"',
     ".msh": rb"\$(Nodes|Elements)\s+(\d+)\s",
 }
-"""Patterns of headers that state the number of elements that follow."""
+"""Patterns of headers: kind and number of the elements that follow."""
 LEAST_BYTES = {".vtu": 1e-3, ".vtp": 1e-3}
-"""Bytes that one of them takes at the very least: zlib packs a thousand to one. In the other formats two."""
+"""Fewest bytes of an element, because zlib packs up to a thousand to one; 2 in the other formats."""
 ENDS = {".vtu": b"</VTKFile>", ".vtp": b"</VTKFile>", ".msh": b"$EndElements"}
 """Text near the end of a complete file."""
 
 
 def check_promises(path: Path) -> None:
-    """Raise StudyError for a file that is empty, of another kind, or shorter than its header says."""
+    """Raise StudyError for a file that is empty, packed by gzip, of another kind, or shorter than its header says."""
     size = path.stat().st_size
     if not size:
         raise unreadable(path, "it is empty")
@@ -77,7 +77,7 @@ def check_promises(path: Path) -> None:
 
 
 def check_stl(path: Path, head: bytes) -> None:
-    """Raise StudyError for another file that is called .stl; head: its first bytes."""
+    """Raise StudyError for a file called .stl that has another format; head: its first bytes."""
     if path.suffix.lower() != ".stl" or is_ascii_stl(head):
         return
     kind = next((kind for first, kind in NO_STL.items() if head.startswith(first)), None)
@@ -88,18 +88,17 @@ def check_stl(path: Path, head: bytes) -> None:
 
 
 def other_kind(head: bytes) -> str | None:
-    """The kind of a file that is not a mesh, by its first bytes."""
+    """The kind of a file that is not a mesh, from its first bytes; None for any other file."""
     return next((kind for first, kind in OTHER_KINDS.items() if head.lstrip().lower().startswith(first.lower())), None)
 
 
 def unreadable(path: Path, reason: str) -> StudyError:
-    """The sentence for a file that is not a mesh."""
+    """The error for a file that is not a mesh."""
     return StudyError(f"{path.name} is not a mesh that can be read ({reason}); give {FORMATS}")
 
 
 def reason_of(path: Path, error: BaseException, output: str) -> str:
-    """Why a reader failed on the file: from the file itself, else from the `output` of the reader, else from its
-    error."""
+    """Why a reader failed on a file: from the file, else from the `output` of the reader, else from its error."""
     end = ENDS.get(path.suffix.lower())
     if (end and end not in tail(path)) or is_open_stl(path):
         return "it is cut short: its end is missing"
@@ -124,7 +123,7 @@ WORDS: tuple[tuple[tuple[type[BaseException], ...], str], ...] = (
 
 
 def sentence_in(text: str) -> str:
-    """The first understandable line of the output of a reader; "" if there is none."""
+    """The first line of the output of a reader that a user understands, up to 120 characters; "" if there is none."""
     for line in text.splitlines():
         line = " ".join(line.split()).removeprefix("Error: ").rstrip(".")
         if line and not re.search(r"Couldn't read|\w+Error\b|\w+Exception\b|Traceback|<class|0x[0-9a-f]{6}|/", line):
@@ -133,7 +132,7 @@ def sentence_in(text: str) -> str:
 
 
 def comma_of(path: Path) -> str | None:
-    """Where a text STL has decimal commas; None of other files."""
+    """A sentence on the first line of a text STL with a decimal comma; None if there is none."""
     if path.suffix.lower() != ".stl" or not is_ascii_stl((data := path.read_bytes())[:HEAD]):
         return None
     first = re.search(COMMA, data, re.MULTILINE)
@@ -144,14 +143,14 @@ def comma_of(path: Path) -> str | None:
 
 
 def tail(path: Path) -> bytes:
-    """The last bytes of a file; after the mesh itself further data may stand."""
+    """The last 64 MiB of a file; further data may follow the mesh."""
     with open(path, "rb") as file:
         file.seek(max(0, path.stat().st_size - (1 << 26)))
         return file.read()
 
 
 def is_open_stl(path: Path) -> bool:
-    """Whether it is a text STL that does not end."""
+    """Whether the file is a text STL without its end."""
     if path.suffix.lower() != ".stl":
         return False
     with open(path, "rb") as file:

@@ -1,4 +1,4 @@
-"""Label masks, the segmentation itself: the surface of one label of a NIfTI or NRRD image."""
+"""Label masks (segmentations): the surface of one label of a NIfTI or NRRD image."""
 
 import re
 from dataclasses import dataclass
@@ -14,30 +14,31 @@ from studies.geometry.mesh.organ_mesh import signed_volume
 
 NIFTI, NRRD = (".nii", ".nii.gz"), (".nrrd", ".nhdr")
 MOST_LABELS = 300
-"""More different values are grey values and no labels."""
+"""An image with more different values has grey values and no labels."""
 ALIKE = 0.5
-"""Share of neighbouring voxels with the same label, of those that both have one: more in a mask, less in an image."""
+"""Share of pairs of labelled neighbouring voxels whose labels are equal: a mask has more, an image of grey values
+less."""
 SEGMENT = "segment it first (3D Slicer, ITK-SNAP, TotalSegmentator …) and give the label map"
 BLUR = 0.8
-"""Width of the Gaussian, in voxels, that rounds the staircase of the voxels; the volume is kept."""
+"""Standard deviation of the Gaussian, in voxels, that smooths the staircase of the voxels; the volume is kept."""
 ROOM = 5
-"""Voxels around the label: the blurred one ends well inside."""
+"""Empty voxels around the label, so that the blurred label ends well inside."""
 LONG_NAMES = {"mm": "mm", "millimeter": "mm", "millimetre": "mm", "cm": "cm", "m": "m", "meter": "m", "metre": "m"}
 FEW = 65_536
 """Labels below this are counted in a table."""
 OTHERS = 6
-"""Labels that a sentence lists."""
+"""Most labels that a sentence lists."""
 
 
 @dataclass(frozen=True, eq=False)
 class Mask:
     """An image of labels.
 
-    labels: integers, shape (a, b, c), 0 outside of everything
-    affine: shape (4, 4), from the index of a voxel to its middle in the file's unit
-    unit: the one stated in the header, or None
-    names: name of a label where the file gives it one
-    by_custom: whether the header states no unit, so that the usual one of the format is assumed
+    labels: integers, shape (a, b, c), 0 where there is no label
+    affine: shape (4, 4), from the index of a voxel to its middle in the unit of the file
+    unit: the unit in the header, or the usual one of the format; None if it is unknown
+    names: label -> name, if the file has names
+    by_custom: whether `unit` is only the usual one of the format, because the header states no known unit
     """
 
     labels: np.ndarray
@@ -48,19 +49,20 @@ class Mask:
 
     @property
     def voxel(self) -> float:
-        """Volume of a voxel in the file's unit."""
+        """Volume of a voxel, in the cube of the unit of the file."""
         return float(abs(np.linalg.det(self.affine[:3, :3])))
 
 
 def is_mask(path: Path) -> bool:
-    """Whether the name is one of an image."""
+    """Whether the name of the file is that of a NIfTI or NRRD image."""
     return path.name.lower().endswith((*NIFTI, *NRRD))
 
 
 def read_mask(path: Path, part: str | None) -> tuple[Content, str | None]:
-    """The surface of the label `part`, by number or name, or of the only one; and a remark where the image cuts it.
+    """The surface of the label `part` (number or name; None: the only one), and a remark if the image cuts it off.
 
-    Raises StudyError for an image that is no mask, a label that it does not hold, or several labels and none wanted.
+    Raises StudyError for an image that is no mask, for a label that it does not contain, for several labels without a
+    `part`, and if the package that reads the image is not installed.
     """
     mask = load_nrrd(path) if path.name.lower().endswith(NRRD) else load_nifti(path)
     label = chosen_label(mask, part, path.name)
@@ -72,7 +74,7 @@ def read_mask(path: Path, part: str | None) -> tuple[Content, str | None]:
 
 
 def load_nifti(path: Path) -> Mask:
-    """A NIfTI image as a mask."""
+    """A NIfTI image as a mask. Raises StudyError if it is no mask, or if nibabel is not installed."""
     try:
         import nibabel
     except ImportError as error:
@@ -84,7 +86,10 @@ def load_nifti(path: Path) -> Mask:
 
 
 def load_nrrd(path: Path) -> Mask:
-    """An NRRD image as a mask; segments of 3D Slicer have their names."""
+    """An NRRD image as a mask, with the names of the segments of 3D Slicer.
+
+    Raises StudyError if it is no mask, or if pynrrd is not installed.
+    """
     try:
         import nrrd
     except ImportError as error:
@@ -105,7 +110,7 @@ def load_nrrd(path: Path) -> Mask:
 
 
 def missing(name: str, path: Path) -> StudyError:
-    """The message if the reader of an image is not installed."""
+    """The error if the package `name`, which reads an image, is not installed."""
     return StudyError(
         f"{path.name} is a label mask, and {name}, which reads it, is not installed; "
         "run pip install 'organbench[masks]'"
@@ -113,12 +118,12 @@ def missing(name: str, path: Path) -> StudyError:
 
 
 def unit_of(unit_name: str) -> str | None:
-    """One of UNITS, or None if the header states none or another."""
+    """The unit of a header as one of UNITS, or None if it states none or another."""
     return LONG_NAMES.get(unit_name.lower())
 
 
 def whole_numbers(data: np.ndarray, path: Path) -> np.ndarray:
-    """The image as labels (a, b, c). Raises StudyError for one of other dimensions or of grey levels."""
+    """The image as labels (a, b, c). Raises StudyError for another number of dimensions, fractions, or colours."""
     data = np.squeeze(data)
     if data.ndim != 3:
         raise StudyError(
@@ -134,12 +139,15 @@ def whole_numbers(data: np.ndarray, path: Path) -> np.ndarray:
 
 
 def no_mask(name: str, why: str) -> StudyError:
-    """The sentence for a CT or MR image; why: what it holds."""
+    """The error for an image of grey values, such as CT or MR; why: what shows that."""
     return StudyError(f"{name} holds grey values ({why}), not a mask: {SEGMENT}")
 
 
 def check_labels(labels: np.ndarray, count: int, name: str) -> None:
-    """Raise StudyError for grey values: of an image most neighbours differ, of a mask few; count: of labels."""
+    """Raise StudyError for an image of grey values: many values, or labelled neighbours that mostly differ.
+
+    count: number of different labels.
+    """
     if labels.min() < -1:
         raise no_mask(name, f"down to {int(labels.min()):,}")
     if count > MOST_LABELS:
@@ -157,7 +165,7 @@ def check_labels(labels: np.ndarray, count: int, name: str) -> None:
 
 
 def chosen_label(mask: Mask, part: str | None, name: str) -> int:
-    """The label asked for, by number or name. Raises StudyError where it cannot be determined."""
+    """The label `part`, by number or name, or the only one. Raises StudyError if it cannot be determined."""
     voxels = voxels_of(mask.labels)
     if not voxels:
         raise StudyError(f"{name} holds no label: every voxel is 0; give the segmentation")
@@ -174,8 +182,8 @@ def chosen_label(mask: Mask, part: str | None, name: str) -> int:
 
 
 def voxels_of(labels: np.ndarray) -> dict[int, int]:
-    """Number of voxels of each label but 0."""
-    if labels.size and labels.min() >= 0 and labels.max() < FEW:  # counted, which is faster than sorted
+    """Number of voxels of each label except 0."""
+    if labels.size and labels.min() >= 0 and labels.max() < FEW:  # counting is faster than sorting
         counts = np.bincount(labels.ravel())
         return {int(k): int(counts[k]) for k in np.flatnonzero(counts) if k}
     numbers, counts = np.unique(labels, return_counts=True)
@@ -183,16 +191,16 @@ def voxels_of(labels: np.ndarray) -> dict[int, int]:
 
 
 def listed(mask: Mask, voxels: dict[int, int]) -> str:
-    """Labels with the number of their voxels, the largest first."""
+    """The labels and the numbers of their voxels in words, the largest first."""
     order = sorted(voxels, key=lambda k: -voxels[k])
     rows = [f"{k}{f' ({mask.names[k]})' if k in mask.names else ''} of {voxels[k]:,} voxels" for k in order[:OTHERS]]
     return ", ".join(rows) + (f" and {len(order) - OTHERS} more" if len(order) > OTHERS else "")
 
 
 def label_surface(mask: Mask, label: int) -> tuple[np.ndarray, np.ndarray, bool]:
-    """Points (n, 3) in the file's unit and outward triangles (t, 3) around a label; whether the image cuts it off.
+    """Points (n, 3) in the unit of the file and outward triangles (t, 3) around a label; whether the image cuts it off.
 
-    The label is blurred by BLUR voxels; the level that bounds it is the one that leaves as many voxels inside.
+    The label is blurred by BLUR voxels. The surface is the level that has as many voxels inside as the label.
     """
     from skimage.measure import marching_cubes  # loads slowly, and few files need it
 

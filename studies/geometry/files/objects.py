@@ -1,4 +1,4 @@
-"""Files read by trimesh: OFF, OBJ and glTF (geometry alone, no materials, no motion), with the objects they name."""
+"""Files that trimesh reads: OFF, OBJ and glTF (geometry only, no materials or motion), with their named objects."""
 
 import io
 import re
@@ -11,13 +11,13 @@ from studies.geometry.files.content import Content
 
 NONE = np.empty((0, 4), np.int64)
 METRES = (".glb", ".gltf")
-"""The standard of glTF says metres."""
+"""Formats whose standard prescribes metres."""
 OBJECT = re.compile(rb"^o[ \t]+(\S.*?)\s*$", re.MULTILINE)
-"""Where an object of an OBJ file begins."""
+"""The line with which an object of an OBJ file begins."""
 
 
 def read_objects(path: Path) -> Content:
-    """All triangles of a file, each object where the file puts it and with its own number.
+    """All triangles of a file. Each object has its transformation applied and is a part, if there are several.
 
     Khronos Group: glTF 2.0 specification, 2021. Raises any exception of trimesh for a broken file.
     """
@@ -29,9 +29,9 @@ def read_objects(path: Path) -> Content:
         shape = scene.geometry[name]
         faces = np.asarray(getattr(shape, "faces", []), np.int64).reshape(-1, 3)
         if not len(faces):
-            continue  # lines and points bound nothing
+            continue  # only lines or points
         points.append(np.asarray(shape.vertices, float) @ placed[:3, :3].T + placed[:3, 3])
-        # A mirrored object would be inside out.
+        # A reflection would turn the triangles inwards.
         triangles.append((faces[:, ::-1] if np.linalg.det(placed[:3, :3]) < 0 else faces) + count)
         part.append(np.full(len(faces), len(names)))
         names.append(str(name))
@@ -48,7 +48,7 @@ def read_objects(path: Path) -> Content:
 
 
 def scene_of(path: Path) -> Any:
-    """The file as trimesh holds it, its points neither merged nor reordered."""
+    """The file as a trimesh scene, whose points are neither merged nor reordered."""
     import trimesh  # takes a second to load, and few files need it
 
     if path.suffix.lower() != ".obj":
@@ -58,7 +58,7 @@ def scene_of(path: Path) -> Any:
 
 
 def in_order(scene: Any, path: Path) -> list[str]:
-    """Nodes of the scene that hold geometry, in the file's order."""
+    """Names of the nodes of a scene that have geometry, in the order of the file."""
     names = list(scene.geometry)
     if path.suffix.lower() == ".obj":
         names = [name.decode(errors="ignore") for name in OBJECT.findall(path.read_bytes())] + names
@@ -66,7 +66,10 @@ def in_order(scene: Any, path: Path) -> list[str]:
 
 
 def counted_from_one(text: bytes) -> bytes:
-    """The text of an OBJ with the corners of its faces counted from its first point: negative ones count back."""
+    """The text of an OBJ whose faces count points from the first one; negative numbers, which count back, are replaced.
+
+    Faces then lose their numbers of texture coordinates and normals.
+    """
     if not re.search(rb"^f\b.*-\d", text, re.MULTILINE):
         return text
     lines, points = [], 0

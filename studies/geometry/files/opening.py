@@ -1,4 +1,4 @@
-"""Opens a mesh file of any format: returns its content, or raises an error with the reason."""
+"""Reads the content of a mesh file of any supported format, or raises an error with the reason."""
 
 import contextlib
 import io
@@ -23,10 +23,11 @@ OBJECTS = (".off", ".obj", ".glb", ".gltf")
 
 
 def opened(source: Source) -> Content:
-    """The content of the requested part of a file, in the unit of the file.
+    """The content of a file, or of the part of it that `source` names, in the unit of the file.
 
-    STL, PLY, VTK, VTU, MSH and more by meshio, OFF, OBJ and glTF by trimesh, VTP and surfaces in legacy VTK, label
-    masks in NIfTI and NRRD. Raises StudyError for a file that cannot be read, or that lacks cells or the part.
+    meshio reads STL, PLY, VTK, VTU, MSH and more, trimesh OFF, OBJ and glTF; VTP, surfaces in legacy VTK, and label
+    masks in NIfTI and NRRD are read too. Warns of an assumed unit and of a label that the image cuts off. Raises
+    StudyError for a file that cannot be read, or that lacks cells or the part.
     """
     path = source.path
     if not path.is_file():
@@ -39,7 +40,7 @@ def opened(source: Source) -> Content:
             content, remark = read(path, source.part)
     except StudyError:
         raise
-    # External parsers may raise any exception for a broken file, and meshio even exits the process.
+    # Readers may raise any exception for a broken file, and meshio may even exit the process.
     except (Exception, SystemExit) as error:
         raise unreadable(path, reason_of(path, error, output.getvalue())) from error
     if remark:
@@ -55,7 +56,7 @@ def opened(source: Source) -> Content:
 
 
 def read(path: Path, part: str | None) -> tuple[Content, str | None]:
-    """The file by its format, and a remark. Raises any exception of its reader."""
+    """The content of a file, and a remark for the user or None. Raises any exception of the reader."""
     suffix = path.suffix.lower()
     if is_mask(path):
         return read_mask(path, part)
@@ -74,7 +75,10 @@ def read(path: Path, part: str | None) -> tuple[Content, str | None]:
 
 
 def content_of(raw: meshio.Mesh, name: str) -> Content:
-    """Tetrahedra and triangles of a mesh, polygons cut up; raises StudyError for cells of other kinds."""
+    """Tetrahedra and triangles of a mesh, with polygons cut into triangles; points and lines are left out.
+
+    Raises StudyError for cells of other kinds.
+    """
     tetrahedra, triangles = [np.empty((0, 4), np.int64)], [np.empty((0, 3), np.int64)]
     for block in raw.cells:
         if block.type in ("vertex", "line"):

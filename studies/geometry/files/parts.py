@@ -1,4 +1,4 @@
-"""Several bodies in one file, separated by name where the file has names, else by what hangs together."""
+"""Several bodies in one file, separated by name if the file has names, else by connectivity."""
 
 from dataclasses import dataclass, replace
 
@@ -11,9 +11,9 @@ from studies.base.errors import StudyError
 from studies.geometry.files.content import Content
 
 WELD = 1e-7
-"""Points nearer than this fraction of the diagonal are one point: single precision, in which STL is written."""
+"""Points nearer than this fraction of the diagonal are one point: the single precision of STL files."""
 LISTED = 12
-"""Parts that a sentence or a table lists."""
+"""Most parts that a sentence or a table lists."""
 
 
 @dataclass(frozen=True)
@@ -21,15 +21,18 @@ class Part:
     """One body of a file."""
 
     number: int
-    """From 1: in the file's order where parts have names, else the largest box first."""
+    """From 1: in the order of the file if parts have names, else the largest box first."""
     name: str
     triangles: int
     size: tuple[float, float, float]
-    """Sides of its box in the file's unit."""
+    """Sides of its box in the unit of the file."""
 
 
 def parts_in(content: Content) -> list[Part]:
-    """The bodies of a surface; one of a body of tetrahedra, or of points that are no numbers."""
+    """The parts of a surface; none without triangles.
+
+    The triangles are one part if the file has tetrahedra, or if a coordinate is not finite.
+    """
     numbers, names = numbered(content)
     parts = []
     for k in range(int(numbers.max(initial=-1)) + 1):
@@ -41,7 +44,10 @@ def parts_in(content: Content) -> list[Part]:
 
 
 def chosen(content: Content, part: str | None, name: str) -> Content:
-    """The part of a surface that is wanted, by name or number; all of it for None. Raises StudyError."""
+    """The content reduced to `part`, given by name or number; None: all of it. name: of the file.
+
+    Raises StudyError for an unknown part, and for a part of a body of tetrahedra.
+    """
     if part is None:
         return content
     if len(content.tetrahedra):
@@ -57,7 +63,7 @@ def chosen(content: Content, part: str | None, name: str) -> Content:
 
 
 def listed(names: tuple[str, ...], count: int) -> str:
-    """The parts as words."""
+    """The parts in words."""
     if not names:
         return f"{count} part{'s' * (count != 1)}, numbered from 1 by their size"
     more = f" and {count - LISTED} more" if count > LISTED else ""
@@ -65,7 +71,10 @@ def listed(names: tuple[str, ...], count: int) -> str:
 
 
 def numbered(content: Content) -> tuple[np.ndarray, tuple[str, ...]]:
-    """The part of each triangle, (t,), and the names: the file's, or none and the largest box first."""
+    """The number of the part of each triangle from 0, (t,), and the names of the parts.
+
+    Without names in the file the parts are the connected ones, the one with the largest box first.
+    """
     if content.names:
         return content.part, content.names
     finite = np.isfinite(content.points).all()
@@ -86,7 +95,10 @@ def numbered(content: Content) -> tuple[np.ndarray, tuple[str, ...]]:
 
 
 def coincident(points: np.ndarray) -> np.ndarray:
-    """For each point (n, 3) the first one that lies within WELD of the diagonal of it, or of one that does, (n,)."""
+    """For each point (n, 3) the index of the first point that coincides with it, (n,).
+
+    Points coincide if they are within WELD of the diagonal, or if a chain of such points joins them.
+    """
     reach = WELD * float(np.linalg.norm(np.ptp(points, axis=0)))
     i, j = KDTree(points).query_pairs(reach, output_type="ndarray").T
     graph = coo_array((np.ones(len(i)), (i, j)), shape=(len(points), len(points)))

@@ -1,4 +1,4 @@
-"""Surfaces in VTK's legacy format, DATASET POLYDATA: meshio reads unstructured grids alone.
+"""Surfaces in the legacy format of VTK, DATASET POLYDATA, which meshio does not read.
 
 File formats: The VTK User's Guide, 11th edition, 2010, chapter 19.
 """
@@ -22,24 +22,24 @@ TYPES = {
     b"unsigned_int": ">u4",
     b"unsigned_long": ">u8",
 }
-"""Types of legacy files; binary ones are big-endian."""
+"""Number types of legacy files; binary files are big-endian."""
 CELLS = (b"VERTICES", b"LINES", b"POLYGONS", b"TRIANGLE_STRIPS")
 Triangles = np.ndarray
 """Shape (t, 3)."""
 
 
 def is_legacy_polydata(path: Path) -> bool:
-    """Whether a .vtk file holds a surface and not a grid."""
+    """Whether a .vtk file contains a surface and not a grid."""
     with open(path, "rb") as file:
         head = file.read(1024)
     return head.startswith(b"# vtk") and re.search(rb"\nDATASET\s+POLYDATA", head, re.IGNORECASE) is not None
 
 
 class Legacy:
-    """The text and numbers of a legacy file, one after the other."""
+    """Reads the lines and numbers of a legacy file one after the other."""
 
     def __init__(self, data: bytes):
-        """data: the whole file."""
+        """data: the bytes of the whole file."""
         self.data, self.at = data, 0
         self.line()  # version
         self.line()  # title
@@ -53,7 +53,7 @@ class Legacy:
         return line
 
     def words(self) -> list[bytes]:
-        """Words of the next line that has any; empty at the end of the file."""
+        """Words of the next line that is not empty; [] at the end of the file."""
         while self.at < len(self.data):
             words = self.line().split()
             if words:
@@ -61,7 +61,7 @@ class Legacy:
         return []
 
     def numbers(self, count: int, kind: bytes) -> np.ndarray:
-        """The next `count` numbers. Raises ReadError when there are fewer."""
+        """The next `count` numbers of a type of TYPES. Raises ReadError if there are fewer, or for another type."""
         if kind.lower() not in TYPES:
             raise meshio.ReadError(f"numbers of type {kind.decode(errors='replace')} are not known")
         dtype = np.dtype(TYPES[kind.lower()])
@@ -87,7 +87,7 @@ class Legacy:
 def read_legacy(path: Path) -> tuple[np.ndarray, Triangles]:
     """Points (n, 3) and triangles (t, 3) of a legacy file; polygons and strips are cut into triangles.
 
-    Raises ReadError for a file that breaks off.
+    Raises ReadError for a file that is cut short or has numbers of an unknown type.
     """
     text = Legacy(path.read_bytes())
     points, triangles = np.empty((0, 3)), [np.empty((0, 3), np.int64)]
@@ -105,8 +105,11 @@ def read_legacy(path: Path) -> tuple[np.ndarray, Triangles]:
 
 
 def cells(text: Legacy, first: int, second: int) -> tuple[np.ndarray, np.ndarray]:
-    """Number of corners of each cell, and the corners of all, of the old form (counts among the corners) or the new
-    one of version 5.1 (OFFSETS, CONNECTIVITY)."""
+    """Number of corners of each cell, and the corners of all cells in turn.
+
+    first, second: the two numbers in the line of the cells. Reads the old form, with counts among the corners, and that
+    of version 5.1, with OFFSETS and CONNECTIVITY.
+    """
     start = text.at
     words = text.words()
     if words and words[0].upper() == b"OFFSETS":
@@ -116,7 +119,7 @@ def cells(text: Legacy, first: int, second: int) -> tuple[np.ndarray, np.ndarray
     text.at = start
     table = text.numbers(second, b"int").astype(np.int64)
     if first and second % first == 0 and (table.reshape(first, -1)[:, 0] == second // first - 1).all():
-        rows = table.reshape(first, -1)  # all of one kind
+        rows = table.reshape(first, -1)  # all cells have the same number of corners
         return rows[:, 0], rows[:, 1:].ravel()
     sizes, corners, at = [], [], 0
     for _ in range(first):
@@ -127,7 +130,7 @@ def cells(text: Legacy, first: int, second: int) -> tuple[np.ndarray, np.ndarray
 
 
 def cut(sizes: np.ndarray, corners: np.ndarray, strips: bool) -> Triangles:
-    """Triangles (t, 3) of cells with so many corners; of strips every second one is turned round."""
+    """Triangles (t, 3) of polygons or strips with `sizes` corners each; every second triangle of a strip is flipped."""
     starts, triangles = np.cumsum(sizes) - sizes, [np.empty((0, 3), np.int64)]
     for size in np.unique(sizes[sizes > 2]):
         rows = corners[starts[sizes == size][:, None] + np.arange(size)]

@@ -1,4 +1,4 @@
-"""Reading a surface or tetrahedral mesh from a file, in metres, welded and checked."""
+"""Reads a surface or tetrahedral mesh from a file in metres, welds and checks it."""
 
 import warnings
 from dataclasses import replace
@@ -15,16 +15,16 @@ from studies.geometry.mesh.checks import check_finite, check_surface, check_tetr
 from studies.geometry.mesh.organ_mesh import OrganMesh, signed_volume, surface_first, tetrahedron_volumes
 
 PATCH = "patch_"
-"""Point data with this prefix are attachments."""
+"""Prefix of point data that are attachments."""
 
 
 def read_mesh(path: str | Path | Source, unit: str | None = None, flip: bool = False) -> OrganMesh:
     """A closed surface or a tetrahedral body from any file that `opened` reads (STL, PLY, OBJ, VTK, glTF, masks, ...).
 
-    path: a file, or a Source, which also has a scale or a part. unit: of the file's coordinates, one of UNITS; None:
-    that stated in the file, or metres. flip: whether an inside-out surface or negative tetrahedra are reversed instead
-    of refused. Duplicate points are merged and unused points are left out; if a body has tetrahedra, its triangles are
-    left out too. Warns when the size does not fit the unit. Raises StudyError for a file that cannot be read or whose
+    path: a file, or a Source, which also has a scale or a part. unit: of the coordinates, one of UNITS; None: the one
+    that the file states, or metres. flip: whether an inverted surface or inverted tetrahedra are flipped instead of
+    refused. Coincident points are merged and unused points are left out; if a body has tetrahedra, its triangles are
+    left out too. Warns if the size does not fit the unit. Raises StudyError for a file that cannot be read or whose
     mesh is not usable.
     """
     source = as_source(path, unit)
@@ -50,7 +50,10 @@ def read_mesh(path: str | Path | Source, unit: str | None = None, flip: bool = F
 
 
 def with_patches(mesh: OrganMesh, content: Content, metres: float) -> OrganMesh:
-    """The mesh with the attachments that the file keeps as point data `patch_NAME`, above 0 at their nodes."""
+    """The mesh with the attachments of the file: point data `patch_NAME` that are above 0 at its outer nodes.
+
+    metres: per unit of the file.
+    """
     marked = marked_nodes(content)
     if not marked:
         return mesh
@@ -59,13 +62,13 @@ def with_patches(mesh: OrganMesh, content: Content, metres: float) -> OrganMesh:
 
 
 def marked_nodes(content: Content) -> dict[str, np.ndarray]:
-    """By name of each attachment, which points of the file belong to it, shape (n,) bool."""
+    """Name of each attachment -> which points of the file belong to it, shape (n,) bool."""
     data = {key.removeprefix(PATCH): values for key, values in content.point_data.items() if key.startswith(PATCH)}
     return {name: np.asarray(values).ravel() > 0 for name, values in data.items()}
 
 
 def warn_about_unit(points: np.ndarray, name: str) -> None:
-    """Warn when a body in metres is larger than LARGEST or smaller than SMALLEST."""
+    """Warn if a body of points (n, 3) [m] is larger than LARGEST or smaller than SMALLEST."""
     box = np.ptp(points, axis=0) if len(points) else np.zeros(3)
     if box.max() > LARGEST:
         sides = " x ".join(f"{side:.4g}" for side in box)
@@ -78,14 +81,17 @@ def warn_about_unit(points: np.ndarray, name: str) -> None:
 
 
 def weld(points: np.ndarray, cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Points used by the cells, coincident ones made one, in the file's order; cells renumbered."""
+    """Points (n, 3) that the cells use, with coincident ones merged, in the order of the file; and renumbered cells."""
     cells = coincident(points)[cells]
     used, renumbered = np.unique(cells, return_inverse=True)
     return points[used], renumbered.reshape(cells.shape).astype(np.int64)
 
 
 def tetrahedral(points: np.ndarray, tetrahedra: np.ndarray, flip: bool, recipe: dict) -> OrganMesh:
-    """A checked body with its boundary, the boundary's nodes first."""
+    """A checked body with its boundary, whose nodes come first; flip: whether inverted tetrahedra are flipped.
+
+    Raises StudyError for tetrahedra that form no usable body.
+    """
     if flip:
         negative = tetrahedron_volumes(points, tetrahedra) < 0
         tetrahedra[negative] = tetrahedra[negative][:, [0, 2, 1, 3]]

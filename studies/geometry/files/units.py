@@ -1,4 +1,4 @@
-"""Units of length in files without a stated unit: recognised by the size of organs, and never assumed silently."""
+"""Units of length of mesh files: stated by the user or the file, or recognised by the size of organs."""
 
 import hashlib
 import re
@@ -11,17 +11,17 @@ from studies.base.errors import StudyError
 
 UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "in": 0.0254}
 GUESSED = ("m", "cm", "mm")
-"""Units that a size is compared with; inches only when they are asked for."""
+"""Units in which a size is compared with that of organs; inches have to be given."""
 ORGAN = 0.02, 0.6
 """Longest side [m] of an organ: from a foetal kidney to the lungs of an adult."""
 LARGEST, SMALLEST = 5.0, 1e-3
-"""Longest side [m] beyond which nothing is an organ."""
+"""Longest side [m] above and below which nothing is an organ."""
 LEAST_VOLUME = 1e-6
-"""Volume [m³] below which nothing is an organ: a pituitary gland has half of it, an adrenal one four times as much."""
+"""Volume [m³] below which nothing is an organ: a pituitary gland has half, an adrenal gland four times as much."""
 FAR_AWAY = 1e3
 """Distance from the origin [m] beyond which coordinates have too few digits left for an organ."""
 ABSURD = 1e6, 1e-9
-"""Longest side [m] beyond which a file is not even examined: squares and cubes of it would leave the numbers' range."""
+"""Longest side [m] above and below which a file is not even examined."""
 NAMES = {"m": "metres", "cm": "centimetres", "mm": "millimetres", "in": "inches"}
 
 
@@ -31,17 +31,17 @@ class Source:
 
     path: Path
     unit: str | None = None
-    """Of the coordinates, one of UNITS; None: that stated in the file, or metres if only these give the size of an
-    organ."""
+    """Unit of the coordinates, one of UNITS; None: the one that the file states, or metres if only metres give the
+    size of an organ."""
     scale: float = 1.0
-    """The coordinates are multiplied by this first."""
+    """Factor of the coordinates, applied before the unit."""
     longest_side: float | None = None
-    """Of the body [m], instead of a unit and a scale."""
+    """Longest side of the body [m], instead of a unit and a scale."""
     part: str | None = None
-    """Name or number of the part, or label of the mask; None: the largest, and of a mask the only one."""
+    """Name or number of the part, or label of the mask; None: the whole file, or the only label of a mask."""
 
     def __post_init__(self) -> None:
-        """Raises StudyError for invalid lengths."""
+        """Raises StudyError for an unknown unit, an invalid length, or a longest side next to a unit or scale."""
         object.__setattr__(self, "path", Path(self.path))
         name = self.path.name
         if self.unit is not None:
@@ -58,9 +58,10 @@ class Source:
             raise StudyError(f"{name}: give the longest side, or a unit and a scale, but not both")
 
     def metres(self, side: float, header_unit: str | None) -> float:
-        """Metres per unit of the file, whose longest side is `side` and whose header states `header_unit`, or None.
+        """Metres per unit of the file, including the scale.
 
-        Raises StudyError where the unit has to be given.
+        side: longest side in the unit of the file; header_unit: the unit that the file states, or None. Raises
+        StudyError if the user has to give the unit.
         """
         if self.longest_side is not None:
             return self.longest_side / side if side > 0 else 1.0
@@ -68,7 +69,8 @@ class Source:
 
     @property
     def sha256(self) -> str | None:
-        """SHA-256 of the bytes of the file (hex), which identifies it at any path; None if it cannot be read."""
+        """SHA-256 of the bytes of the file (hexadecimal), which identifies it at any path; None if it cannot be
+        read."""
         try:
             return hashlib.sha256(self.path.read_bytes()).hexdigest()
         except OSError:
@@ -76,13 +78,13 @@ class Source:
 
     @property
     def recipe(self) -> dict[str, object]:
-        """The settings besides the content of the file on which a mesh depends, JSON-able, without the path."""
+        """Scale, longest side and part, if they are given; JSON-able."""
         given = {"scale": None if self.scale == 1.0 else self.scale, "longest_side": self.longest_side}
         return {key: value for key, value in (given | {"part": self.part}).items() if value is not None}
 
 
 def stem_of(path: Path) -> str:
-    """The name without its ending, ".nii.gz" as a whole: "spleen" of "spleen.nii.gz"."""
+    """The name without its suffix; ".nii.gz" is one suffix: "spleen.nii.gz" becomes "spleen"."""
     return path.stem.removesuffix(".nii") if path.suffix == ".gz" else path.stem
 
 
@@ -102,7 +104,8 @@ def check_unit(unit: str) -> None:
 
 
 def check_range(side: float, name: str, low: float = ABSURD[1], high: float = ABSURD[0]) -> None:
-    """Raise StudyError for a longest side [m] that no organ has; 0 and NaN pass, since other checks report them."""
+    """Raise StudyError for a longest side [m] outside `low` to `high`; 0 and NaN pass, because other checks report
+    them."""
     if side > high:
         raise StudyError(
             f"{name}: the longest side is {side:.3g} m; no organ is larger than {LARGEST:g} m: correct the unit or the "
@@ -116,7 +119,7 @@ def check_range(side: float, name: str, low: float = ABSURD[1], high: float = AB
 
 
 def length_of(text: str) -> float:
-    """Metres of a length such as "19cm" or "190 mm". Raises StudyError for anything else."""
+    """The length [m] that a text such as "19cm" or "190 mm" states. Raises StudyError for any other text."""
     match = re.fullmatch(r"\s*([0-9.]+(?:[eE][-+]?\d+)?)\s*([a-z]+)\s*", text)
     if not match or match[2] not in UNITS or match[1].count(".") > 1 or match[1] == ".":
         raise StudyError(f"'{text}' is not a length; give a number and its unit ({', '.join(UNITS)}), such as 19cm")
@@ -124,7 +127,7 @@ def length_of(text: str) -> float:
 
 
 def likely_units(side: float) -> list[str]:
-    """The units in which a longest side of `side` is that of an organ, the largest first."""
+    """The units in which `side` is a plausible longest side of an organ, the largest unit first."""
     return [unit for unit in GUESSED if ORGAN[0] <= side * UNITS[unit] <= ORGAN[1]]
 
 
@@ -138,7 +141,11 @@ def unit_question(name: str, side: float) -> str:
 
 
 def settled_unit(name: str, side: float, unit: str | None) -> str:
-    """`unit` when it is given, "m" when only metres fit an organ; raises StudyError when it must be given."""
+    """`unit` if it is given, else "m" if only metres give the size of an organ.
+
+    side: longest side in the unit of the file, scaled. Raises StudyError for an unknown unit, and if the user has to
+    give the unit.
+    """
     if unit is not None:
         check_unit(unit)
         return unit

@@ -1,7 +1,7 @@
-"""VTK's XML files as meshio can read them: VTP files renamed to VTU, raw bytes at the end put where they belong.
+"""Converts XML files of VTK so that meshio can read them: VTP to VTU, and raw appended data to inline data.
 
-meshio reads unstructured grids alone, and mixes up arrays that stand as raw bytes at the end of a file, where ParaView
-puts them. File formats: The VTK User's Guide, 11th edition, 2010, chapter 19.3.
+meshio reads unstructured grids only, and confuses arrays that ParaView appends as raw bytes at the end of a file. File
+formats: The VTK User's Guide, 11th edition, 2010, chapter 19.3.
 """
 
 import base64
@@ -11,7 +11,7 @@ import meshio
 import numpy as np
 
 POLYGON = 7
-"""VTK's number of that kind of cell."""
+"""Number of this kind of cell in VTK."""
 RAW = re.compile(rb'<AppendedData[^>]*encoding\s*=\s*"raw"[^>]*>\s*_')
 ARRAY = re.compile(rb'<DataArray\b([^>]*?offset\s*=\s*"(\d+)"[^>]*?)(?:/>|>.*?</DataArray>)', re.DOTALL)
 
@@ -23,7 +23,7 @@ def as_grid(data: bytes) -> bytes:
 
 
 def as_cells(piece: bytes) -> bytes:
-    """A piece of a VTP file with its polygons as cells."""
+    """A piece of a VTP file with its polygons as cells. Raises ReadError for triangle strips."""
     for kind in (b"Strips", b"Verts", b"Lines"):
         counts = re.findall(rb'NumberOf%s\s*=\s*"(\d+)"' % kind, piece)
         if kind == b"Strips" and any(int(count) for count in counts):
@@ -38,7 +38,8 @@ def as_cells(piece: bytes) -> bytes:
 
 
 def with_arrays(data: bytes) -> bytes:
-    """The file with every array in its place, in base64; as it is when no raw bytes stand at its end."""
+    """The file with its raw appended arrays inline in base64; unchanged if it has none. Raises ReadError if it is cut
+    short."""
     raw = RAW.search(data)
     if raw is None:
         return data
@@ -57,9 +58,10 @@ def with_arrays(data: bytes) -> bytes:
 
 
 def block(blob: bytes, at: int, size: np.dtype, packed: bool) -> tuple[bytes, bytes]:
-    """Header and body of the array at byte `at`: its length, or of a packed one the numbers and lengths of its blocks.
+    """Header and body of the array at byte `at` of the appended data `blob`.
 
-    Raises ReadError where the file ends before.
+    The header is the length of the array, or of a packed one the number and the lengths of its blocks, in numbers of
+    the type `size`. Raises ReadError if the file ends before.
     """
 
     def number(k: int) -> int:

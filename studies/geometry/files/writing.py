@@ -1,4 +1,4 @@
-"""Writing a mesh to a file, whole or not at all."""
+"""Writes a mesh to a file, whole or not at all."""
 
 import contextlib
 import io
@@ -17,13 +17,13 @@ from studies.geometry.mesh.organ_mesh import OrganMesh
 from studies.geometry.mesh.second_order import CurvedMesh
 
 VOLUMES, SURFACES = (".vtu", ".vtk", ".msh"), (".stl", ".ply", ".obj", ".off")
-"""Formats that hold tetrahedra, and those that hold triangles only."""
+"""Suffixes of formats with tetrahedra, and of those with triangles only."""
 TAGS = {"outer": 1, "lumen": 2, "tissue": 3}
-"""Cell data `part` (VTU, VTK), physical groups (MSH)."""
+"""Values of the cell data `part` (VTU, VTK) and of the physical groups (MSH)."""
 
 
 def check_target(path: Path, source: Path | None = None) -> None:
-    """Raise StudyError unless `path` has a suffix that can be written and is not the file that is read."""
+    """Raise StudyError unless `path` has a suffix that can be written, is no folder, and is not the file `source`."""
     suffixes = (*VOLUMES, *SURFACES)
     if path.suffix.lower() not in suffixes:
         raise StudyError(f"{path.name}: meshes are written as {', '.join(suffixes)}; choose one of these suffixes")
@@ -34,15 +34,15 @@ def check_target(path: Path, source: Path | None = None) -> None:
 
 
 def holds_tetrahedra(path: Path) -> bool:
-    """Whether the format of `path` can hold a filled body."""
+    """Whether the format of `path` can contain tetrahedra."""
     return path.suffix.lower() in VOLUMES
 
 
 def write_mesh(mesh: OrganMesh, path: Path, unit: str = "m", curved: CurvedMesh | None = None) -> None:
-    """The mesh in a file, its format by the suffix, lengths in `unit`; `curved`: its second-order form instead.
+    """Writes the mesh, or its second-order form `curved`, to a file; the suffix decides the format.
 
-    Formats without tetrahedra get the boundary. Raises StudyError for a suffix or unit that is not known, a curved mesh
-    in a format without tetrahedra, or a place that cannot be written.
+    unit: of the lengths in the file, one of UNITS. Formats without tetrahedra get the boundary. Raises StudyError for
+    an unknown suffix or unit, for a curved mesh in a format without tetrahedra, and if the file cannot be written.
     """
     check_target(path)
     check_unit(unit)
@@ -57,7 +57,7 @@ def write_mesh(mesh: OrganMesh, path: Path, unit: str = "m", curved: CurvedMesh 
     if path.suffix.lower() == ".msh":
         parts = written.cell_data.pop("part")
         written.cell_data = {"gmsh:physical": parts, "gmsh:geometrical": parts}
-        # meshio does not read whole numbers back, and writes text that it cannot read: hence binary, and real numbers.
+        # meshio cannot read back integers, nor the text form that it writes: hence floats, and the binary form.
         patches: dict[str, Any] = {name: np.asarray(values, float) for name, values in written.point_data.items()}
         written.point_data = patches
     data = content(written, path.suffix.lower())
@@ -65,7 +65,7 @@ def write_mesh(mesh: OrganMesh, path: Path, unit: str = "m", curved: CurvedMesh 
 
 
 def with_losses(data: bytes, losses: dict[str, Any]) -> bytes:
-    """The bytes of a VTU file with what the mesh lost on the way from its file as field data, SI units."""
+    """The bytes of a VTU file with the losses of the mesh (OrganMesh.losses) as field data, in SI units."""
     numbers: dict[str, list[float]] = {}
     for key, value in losses.items():
         if isinstance(value, dict):
@@ -82,7 +82,7 @@ def with_losses(data: bytes, losses: dict[str, Any]) -> bytes:
 
 
 def straight_cells(mesh: OrganMesh, tetrahedra: bool) -> meshio.Mesh:
-    """Boundary triangles and, when there are and they are wanted, tetrahedra, with patches and parts."""
+    """Boundary triangles, and tetrahedra if `tetrahedra` is set and there are any, with patches and parts."""
     with_cells = tetrahedra and len(mesh.tetrahedra) > 0
     points = mesh.points if with_cells else mesh.points[: mesh.surface_count]
     cells: list[Any] = [("triangle", mesh.triangles.astype(np.int32))]
@@ -95,7 +95,7 @@ def straight_cells(mesh: OrganMesh, tetrahedra: bool) -> meshio.Mesh:
 
 
 def curved_cells(mesh: OrganMesh, curved: CurvedMesh) -> meshio.Mesh:
-    """Second-order tetrahedra; the patches are those of the vertices."""
+    """Second-order tetrahedra; patches contain vertices only, no mid-side nodes."""
     cells: list[Any] = [("tetra10", curved.cells.astype(np.int32))]
     part = np.full(len(curved.cells), TAGS["tissue"], np.int32)
     return meshio.Mesh(curved.points, cells, patch_data(mesh, len(curved.points)), {"part": [part]})
@@ -111,7 +111,7 @@ def patch_data(mesh: OrganMesh, count: int) -> dict[str, Any]:
 
 
 def content(mesh: meshio.Mesh, suffix: str) -> bytes:
-    """The bytes of the file: meshio writes to a folder that is thrown away."""
+    """The bytes of the file, which meshio writes to a temporary folder."""
     options = {".stl": {"binary": True}, ".msh": {"file_format": "gmsh22", "binary": True}}.get(suffix, {})
     with tempfile.TemporaryDirectory() as folder, contextlib.redirect_stdout(io.StringIO()):
         path = Path(folder, "mesh" + suffix)

@@ -1,1 +1,1 @@
-"""Tetrahedra: the mesh of an organ, its quality, curved sides, walls."""
+"""The mesh of an organ: its checks, quality, curved sides, and walls."""

@@ -1,4 +1,4 @@
-"""What a mesh must fulfil before a computation. Each fault found is one StudyError of one sentence."""
+"""What a mesh must fulfil before a computation. The first fault found raises a StudyError of one sentence."""
 
 import numpy as np
 from scipy.sparse import coo_array
@@ -15,11 +15,15 @@ from studies.geometry.mesh.organ_mesh import (
 from studies.geometry.mesh.quality import tetrahedron_radius_ratio, triangle_radius_ratio
 
 SLIVER = 1e-4
-"""Radius ratio below which a triangle or tetrahedron has no usable normal or volume for any purpose."""
+"""Radius ratio below which the normal of a triangle or the volume of a tetrahedron is unusable."""
 
 
 def check_surface(points: np.ndarray, triangles: np.ndarray, name: str = "the surface") -> None:
-    """Raise StudyError unless points (n, 3) [m] and triangles (t, 3) form closed outward surfaces around a volume."""
+    """Raise StudyError unless points (n, 3) [m] and triangles (t, 3) form closed, outward surfaces without slivers.
+
+    Every point must be used, every edge have two triangles, and the volume be positive. Parts may be separate;
+    intersections are not checked. name: for the message.
+    """
     check_indices(points, triangles, 3, name)
     check_edges(triangles, name)
     check_volume(points, triangles, name)
@@ -34,7 +38,10 @@ def check_surface(points: np.ndarray, triangles: np.ndarray, name: str = "the su
 
 
 def check_indices(points: np.ndarray, cells: np.ndarray, corners: int, name: str) -> None:
-    """Raise StudyError unless points are finite and cells (k, corners) point at them, all different, each cell once."""
+    """Raise StudyError unless points (n, 3) are finite and all used, and cells (k, corners) are distinct and valid.
+
+    A valid cell uses existing points, each once.
+    """
     kind = "triangle" if corners == 3 else "tetrahedron"
     if points.ndim != 2 or points.shape[1] != 3:
         raise StudyError(f"{name}: points have shape {points.shape}, expected (n, 3)")
@@ -59,7 +66,7 @@ def check_indices(points: np.ndarray, cells: np.ndarray, corners: int, name: str
 
 
 def check_finite(points: np.ndarray, name: str) -> None:
-    """Raise StudyError unless all coordinates are finite numbers."""
+    """Raise StudyError unless all coordinates of points (n, 3) are finite."""
     bad = np.flatnonzero(~np.isfinite(points).all(axis=1))
     if len(bad):
         raise StudyError(
@@ -68,8 +75,8 @@ def check_finite(points: np.ndarray, name: str) -> None:
 
 
 def check_edges(triangles: np.ndarray, name: str) -> None:
-    """Raise StudyError unless every edge has exactly two triangles that run along it in opposite directions, and every
-    node one fan of triangles."""
+    """Raise StudyError unless triangles (t, 3) are a closed, oriented manifold: two triangles at every edge, which run
+    along it in opposite directions, and one fan of triangles at every node."""
     half = triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
     _, counts = np.unique(np.sort(half, axis=1), axis=0, return_counts=True)
     if (counts == 1).any():
@@ -90,17 +97,17 @@ def check_edges(triangles: np.ndarray, name: str) -> None:
 
 
 def pinched_nodes(triangles: np.ndarray) -> np.ndarray:
-    """Nodes whose triangles form more than one closed fan.
+    """Nodes whose triangles form more than one closed fan, for closed, oriented triangles (t, 3).
 
-    Every corner (triangle, node) is joined to the corner of the neighbour across the edge that leaves the node; going
-    round visits one fan, so the number of cycles at a node is its number of fans. Expects closed, oriented triangles.
+    Each corner (triangle, node) is linked to the corner of the neighbour across the edge that leaves the node. These
+    links form a cycle per fan, so the number of cycles at a node is its number of fans.
     """
     count = len(triangles)
     key = triangles.ravel()
     start, end = triangles.ravel(), triangles[:, [1, 2, 0]].ravel()
     size = int(triangles.max()) + 1
     order = np.argsort(start * size + end)
-    # The half edge end -> start of the neighbour; its next half edge leaves `start` again.
+    # The half edge end -> start of the neighbour; the half edge after it leaves `start` again.
     opposite = order[np.searchsorted((start * size + end)[order], end * size + start)]
     following = (opposite // 3) * 3 + (opposite % 3 + 1) % 3
     label = np.arange(3 * count)
@@ -116,7 +123,7 @@ def pinched_nodes(triangles: np.ndarray) -> np.ndarray:
 
 
 def check_one_part(triangles: np.ndarray, name: str) -> None:
-    """Raise StudyError unless the triangles hang together."""
+    """Raise StudyError unless the triangles (t, 3) are connected."""
     edges = unique_edges(triangles)
     count = int(triangles.max()) + 1
     graph = coo_array((np.ones(len(edges)), (edges[:, 0], edges[:, 1])), shape=(count, count))
@@ -126,10 +133,10 @@ def check_one_part(triangles: np.ndarray, name: str) -> None:
 
 
 def check_volume(points: np.ndarray, triangles: np.ndarray, name: str) -> None:
-    """Raise StudyError unless a closed surface encloses a positive volume."""
+    """Raise StudyError unless the closed surface of points (n, 3) [m] and triangles (t, 3) has a positive volume."""
     volume = signed_volume(points, triangles)
     scale = triangle_areas(points, triangles).sum() ** 1.5
-    # A sphere has 0.094 of this scale; rounding of flat things stays near 1e-17.
+    # A sphere has a volume of 0.094 of this scale; of flat surfaces rounding leaves about 1e-17.
     if abs(volume) <= 1e-9 * scale:
         raise StudyError(f"{name}: the enclosed volume is zero ({volume:.2g} m³); a body needs a thickness")
     if volume < 0:
@@ -137,7 +144,11 @@ def check_volume(points: np.ndarray, triangles: np.ndarray, name: str) -> None:
 
 
 def check_tetrahedra(points: np.ndarray, tetrahedra: np.ndarray, name: str = "the mesh") -> None:
-    """Raise StudyError unless points (n, 3) [m] and tetrahedra (k, 4) form a body of positive, usable elements."""
+    """Raise StudyError unless points (n, 3) [m] and tetrahedra (k, 4) form a body.
+
+    Every point must be used, no element be inverted or a sliver, and the boundary be a closed manifold. name: for the
+    message.
+    """
     check_indices(points, tetrahedra, 4, name)
     volumes = tetrahedron_volumes(points, tetrahedra)
     negative = np.flatnonzero(volumes < 0)

@@ -1,4 +1,7 @@
-"""Cells that a sheet crosses, divided at it into tetrahedra, and how much of each section a blade covers."""
+"""Divides the tetrahedra that a sheet crosses, and measures how much of each section a blade covers.
+
+A sheet is the surface level = 0 of a level that is given at the nodes.
+"""
 
 from collections.abc import Callable
 
@@ -7,18 +10,19 @@ import numpy as np
 from studies.geometry.mesh.organ_mesh import tetrahedron_volumes, triangle_areas
 
 SUBDIVIDED = 8
-"""Parts of a side of a section's triangles: 64 places are asked whether the blade covers them."""
+"""Parts of a side of the triangles of a section: the blade is evaluated at the square of this, 64 points."""
 SECTIONS = (
     (1, ((0, 1), (0, 2), (0, 3))),
     (2, ((0, 2), (0, 3), (1, 3))),
     (2, ((0, 2), (1, 3), (1, 2))),
     (3, ((0, 3), (1, 3), (2, 3))),
 )
-"""Corners in front, and the edges that make a triangle of the section, with the corners from front to back."""
+"""Triangles of the sections of a tetrahedron, whose corners are numbered from front to back: number of corners in front
+of the sheet, and the edges on which the corners of the triangle lie."""
 
 
 def _middles(parts: int) -> np.ndarray:
-    """Barycentric coordinates of the middles of the parts² equal parts of a triangle, (parts², 3)."""
+    """Barycentric coordinates (parts², 3) of the centroids of the parts² equal parts of a triangle."""
     i, j = (grid.ravel() for grid in np.mgrid[:parts, :parts])
     up, down = i + j < parts, i + j < parts - 1
     first, second = (np.concatenate([k[up] + 1 / 3, k[down] + 2 / 3]) / parts for k in (i, j))
@@ -29,8 +33,8 @@ PLACES = _middles(SUBDIVIDED)
 
 
 def crossing_edges(cells: np.ndarray, level: np.ndarray) -> np.ndarray:
-    """Edges of `cells` (k, 4) between nodes in front of a sheet, where `level` (n,) > 0, and behind it, in this order,
-    each once, (e, 2)."""
+    """Edges (e, 2) of `cells` (k, 4) that cross a sheet, each once: first the node in front, where `level` (n,) > 0,
+    then the node behind."""
     ends = cells[:, [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]]].reshape(-1, 2)
     ends = ends[(level[ends] > 0).sum(axis=1) == 1]
     ends = np.where((level[ends[:, :1]] > 0), ends, ends[:, ::-1])
@@ -38,7 +42,7 @@ def crossing_edges(cells: np.ndarray, level: np.ndarray) -> np.ndarray:
 
 
 def crossings(points: np.ndarray, level: np.ndarray, edges: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Where `edges` (e, 2) cross the sheet, as the share of their second end, (e,), and the places [m], (e, 3)."""
+    """Where `edges` (e, 2) cross the sheet: the weight of their second end, (e,), and the point [m], (e, 3)."""
     first, second = level[edges].T
     share = first / (first - second)
     return share, points[edges[:, 0]] + share[:, None] * (points[edges[:, 1]] - points[edges[:, 0]])
@@ -47,10 +51,11 @@ def crossings(points: np.ndarray, level: np.ndarray, edges: np.ndarray) -> tuple
 def divided(
     points: np.ndarray, cells: np.ndarray, level: np.ndarray, edges: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The cells that a sheet crosses as tetrahedra on either side of it, positive, (t, 4), and their side, ±1 (t,).
+    """Divides the cells that a sheet crosses: tetrahedra (t, 4) of positive volume, and their side (t,), 1 in front.
 
-    Node n + e is the place where edge e of `crossing_edges` crosses it. Neighbours and both sides divide a common face
-    alike: a quadrilateral from its smallest number (Dompierre, Labbé, Vallet, Camarero 1999).
+    points (n, 3) [m], cells (k, 4), level (n,), edges (e, 2) of `crossing_edges`. Node n + e is the point where edge e
+    crosses the sheet. Both sides and neighbouring cells divide a common quadrilateral in the same way, by the diagonal
+    at its smallest node number (Dompierre, Labbé, Vallet, Camarero 1999).
     """
     n = len(points)
     places = np.concatenate([points, crossings(points, level, edges)[1]])
@@ -86,8 +91,8 @@ def divided(
 
 
 def _of_wedges(wedges: np.ndarray) -> np.ndarray:
-    """Wedges (w, 6), whose node i faces node i + 3, as three tetrahedra each, (3 w, 4)."""
-    # Turned so that the smallest number comes first: both faces at it are divided from there.
+    """Divides each of the wedges (w, 6), whose node i faces node i + 3, into three tetrahedra, (3 w, 4)."""
+    # The smallest number comes first: both quadrilaterals at that node are divided from it.
     first = np.argmin(wedges, axis=1)
     order = np.array([[0, 1, 2, 3, 4, 5], [1, 2, 0, 4, 5, 3], [2, 0, 1, 5, 3, 4]])
     order = np.concatenate([order, order[:, [3, 4, 5, 0, 1, 2]]])
@@ -101,9 +106,10 @@ def _of_wedges(wedges: np.ndarray) -> np.ndarray:
 def covered_part(
     points: np.ndarray, cells: np.ndarray, level: np.ndarray, covers: Callable[[np.ndarray], np.ndarray]
 ) -> np.ndarray:
-    """The part of each cell's section that a blade covers [1], to about 1 %, (k,); 0 where there is no section.
+    """The share of the section of each cell that a blade covers [1], (k,), to about 1 %; 0 for cells without a section.
 
-    `covers`: places (q, 3) [m] on the sheet -> bool (q,)."""
+    covers: points (q, 3) [m] on the sheet -> bool (q,).
+    """
     covered, whole = np.zeros(len(cells)), np.zeros(len(cells))
     order = np.argsort(-level[cells], axis=1)
     count = (level[cells] > 0).sum(axis=1)

@@ -1,4 +1,4 @@
-"""Whether a curved tetrahedron is folded, decided everywhere in it and not at sample points only."""
+"""Tests whether a curved tetrahedron is folded anywhere, not only at sample points."""
 
 from itertools import product
 
@@ -12,7 +12,7 @@ _NODE |= {(j, i): k for (i, j), k in _NODE.items()}
 
 
 def _cubic_terms() -> tuple[np.ndarray, np.ndarray]:
-    """For each of the 64 products of linear terms its row among the 20 cubic ones, and how often each occurs."""
+    """The row of each of the 64 products of linear terms among the 20 cubic terms, and how often each row occurs."""
     exponents = [tuple(np.bincount(triple, minlength=4)) for triple in product(range(4), repeat=3)]
     rows = {exponent: k for k, exponent in enumerate(sorted(set(exponents)))}
     row = np.array([rows[exponent] for exponent in exponents])
@@ -23,11 +23,11 @@ _ROW, _TIMES = _cubic_terms()
 
 
 def jacobian_coefficients(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
-    """Bernstein coefficients [m^3], shape (k, 20), of det dx/dxi of quadratic tetrahedra (k, 10) in VTK's order.
+    """Bernstein coefficients [m^3], shape (k, 20), of det dx/dxi of quadratic tetrahedra (k, 10) in the order of VTK.
 
     The determinant is a cubic polynomial and lies between its smallest and largest coefficient, so an element with
-    positive coefficients is folded nowhere. A straight element has 20 times 6 V. Johnen, Remacle, Geuzaine: Geometrical
-    validity of curvilinear finite elements, J. Comput. Phys. 233 (2013).
+    positive coefficients is folded nowhere. All 20 coefficients of a straight element are 6 V. Johnen, Remacle,
+    Geuzaine: Geometrical validity of curvilinear finite elements, J. Comput. Phys. 233 (2013).
     """
     x = points[cells]
     control = x.copy()
@@ -45,18 +45,18 @@ def jacobian_coefficients(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
 
 
 def scaled_coefficients(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
-    """Bernstein coefficients, shape (k, 20), over 6 V of the straight element: 1 where straight."""
+    """Bernstein coefficients, shape (k, 20), over 6 V of the straight element with the same vertices [1]."""
     a, b, c, d = points[cells[:, :4]].transpose(1, 0, 2)
     straight = np.einsum("ij,ij->i", b - a, np.cross(c - a, d - a))
     return jacobian_coefficients(points, cells) / straight[:, None]
 
 
 def smallest_jacobian(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
-    """Lower bound, shape (k,), of det dx/dxi over 6 V of the straight element with the same vertices: 1 where straight,
-    at most 0 where the element may be folded."""
+    """Lower bound, shape (k,), of det dx/dxi over 6 V of the straight element with the same vertices [1]: 1 for a
+    straight element, 0 or less for one that may be folded."""
     return scaled_coefficients(points, cells).min(axis=1)
 
 
 def curved_volume(points: np.ndarray, cells: np.ndarray) -> float:
-    """Volume [m^3]: the mean of the coefficients is the mean of the determinant, which is 6 V."""
+    """Volume [m^3] of all cells. The mean of the coefficients is the mean of the determinant, 6 V."""
     return float(jacobian_coefficients(points, cells).mean(axis=1).sum() / 6.0)

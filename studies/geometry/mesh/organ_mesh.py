@@ -8,21 +8,23 @@ import numpy as np
 
 @dataclass(frozen=True, eq=False)
 class OrganMesh:
-    """A closed surface and, when filled, the tetrahedra of which it is the boundary, node by node.
+    """A closed surface and, if filled, the tetrahedra whose boundary it is, node by node.
 
-    A hollow organ has two surfaces, the outer one and the lumen's; both bound its tissue.
+    A hollow organ has two surfaces, the outer one and that of the lumen; both bound its tissue.
 
-    name: what it is
+    name: of the organ or file
     points: rest positions [m], shape (n, 3); the `surface_count` nodes of the boundary come first
-    triangles: the whole boundary, shape (t, 3), seen anticlockwise from outside the tissue (a lumen's from the lumen)
-    tetrahedra: shape (k, 4), positive volumes; empty when not filled
+    triangles: the whole boundary, shape (t, 3), anticlockwise seen from outside the tissue (of the lumen, from inside
+        the lumen)
+    tetrahedra: shape (k, 4), positive volumes; empty if not filled
     surface_count: number of boundary nodes
     patches: name -> indices of the outer surface's nodes inside that attachment region
-    recipe: how to make it again, JSON-able
-    outer_count: number of nodes of the outer surface, which come first of all (0 means all of `surface_count`); in a
-        layered wall of which no element was halved node i + outer_count of the lumen faces node i
-    losses: deviations of a mesh made from the surface in a file (studies.geometry.scanned.fidelity)
-    cuts: name -> faces inside the body, shape (f, 3), along which a cut will open it, seen from in front of its plane
+    recipe: arguments with which the mesher makes the mesh, JSON-able
+    outer_count: number of nodes of the outer surface, which come first of all (0 means `surface_count`); in a layered
+        wall without halved elements node i + outer_count of the lumen faces node i
+    losses: deviations of a mesh from the surface of its file (studies.geometry.scanned.fidelity)
+    cuts: name -> faces inside the body, shape (f, 3), along which a cut will open it, anticlockwise seen from in front
+        of its plane
     """
 
     name: str
@@ -37,12 +39,12 @@ class OrganMesh:
     cuts: dict[str, np.ndarray] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        """A solid organ: all of its boundary is outer surface."""
+        """Without outer_count the organ is solid: its whole boundary is the outer surface."""
         object.__setattr__(self, "outer_count", self.outer_count or self.surface_count)
 
     @property
     def surfaces(self) -> dict[str, np.ndarray]:
-        """Name -> indices into `triangles`: "outer" and, when hollow, "lumen"."""
+        """Name -> indices into `triangles`: "outer" and, if hollow, "lumen"."""
         outer = (self.triangles < self.outer_count).all(axis=1)
         parts = {"outer": np.flatnonzero(outer)}
         return parts | {"lumen": np.flatnonzero(~outer)} if self.hollow else parts
@@ -59,7 +61,7 @@ class OrganMesh:
 
     @property
     def lumen_triangles(self) -> np.ndarray:
-        """Triangles around the lumen, shape (t, 3), turned so that they enclose it with positive volume."""
+        """Triangles around the lumen, shape (t, 3), flipped so that they enclose it with positive volume."""
         return self.triangles[self.surfaces["lumen"]][:, ::-1] if self.hollow else np.empty((0, 3), np.int64)
 
     @property
@@ -78,7 +80,7 @@ class OrganMesh:
         return signed_volume(self.points, self.lumen_triangles) if self.hollow else 0.0
 
     def outer(self) -> "OrganMesh":
-        """The outer surface alone, unfilled, with its patches."""
+        """The outer surface alone, not filled, with its patches."""
         return replace(
             self,
             points=self.points[: self.outer_count],
@@ -94,14 +96,17 @@ class OrganMesh:
         return float(triangle_areas(self.points, self.triangles).sum())
 
     def patch_triangles(self, name: str) -> np.ndarray:
-        """Boundary triangles, shape (s, 3), with all three nodes in patch `name`."""
+        """Boundary triangles, shape (s, 3), with all three nodes in patch `name`; KeyError if there is none."""
         inside = np.zeros(len(self.points), bool)
         inside[self.patches[name]] = True
         return self.triangles[inside[self.triangles].all(axis=1)]
 
 
 def signed_volume(points: np.ndarray, triangles: np.ndarray) -> float:
-    """V = 1/6 sum a . (b x c) [m^3], measured from the middle of the points to keep digits."""
+    """V = 1/6 sum a . (b x c) [m^3] of closed triangles (t, 3), positive if they are outward.
+
+    Coordinates are relative to the mean of the points, which reduces rounding.
+    """
     a, b, c = (points[triangles] - points.mean(axis=0)).transpose(1, 0, 2)
     return float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6.0)
 
@@ -113,7 +118,7 @@ def triangle_normals(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
 
 
 def vertex_normals(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Unit normals, shape (n, 3), of the nodes: of their triangles, weighted by the angle there.
+    """Unit normals, shape (n, 3), of the nodes: means of the normals of their triangles, weighted by the angle there.
 
     G. Thuermer, C. Wuethrich: Computing vertex normals from polygonal facets, J. Graphics Tools 3(1), 1998.
     """
@@ -134,13 +139,13 @@ def triangle_areas(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
 
 
 def unique_edges(triangles: np.ndarray) -> np.ndarray:
-    """Edges of the triangles, each once, shape (e, 2), lower index first, in rising order."""
+    """Edges of the triangles, each once, shape (e, 2), lower index first, in lexicographic order."""
     pairs = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
     return pairs[np.unique(row_keys(pairs), return_index=True)[1]]
 
 
 def tetrahedron_facets(tetrahedra: np.ndarray) -> np.ndarray:
-    """The four facets of every element, shape (4 m, 3), outward for tetrahedra of positive volume."""
+    """The four faces of every one of the tetrahedra (k, 4), shape (4 k, 3), outward for positive volumes."""
     return tetrahedra[:, [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]]].reshape(-1, 3)
 
 
@@ -152,7 +157,10 @@ def boundary_triangles(tetrahedra: np.ndarray) -> np.ndarray:
 
 
 def row_keys(rows: np.ndarray) -> np.ndarray:
-    """One integer per row of up to three indices below two million, in the rows' lexicographic order: sorts fast."""
+    """One integer per row of indices, shape (n,), in the lexicographic order of the rows, which sorts fast.
+
+    Rows have up to three indices below two million; AssertionError if the integers would overflow.
+    """
     base = int(rows.max(initial=0)) + 1
     assert base ** rows.shape[1] < 2**63
     key = rows[:, 0].astype(np.int64)
@@ -162,7 +170,7 @@ def row_keys(rows: np.ndarray) -> np.ndarray:
 
 
 def same_triangles(one: np.ndarray, other: np.ndarray) -> bool:
-    """Whether two sets of triangles use the same nodes, whatever the order."""
+    """Whether two sets of triangles are equal, whatever the order of triangles and corners."""
     if len(one) != len(other) or one.max() != other.max():
         return False
     rows = [np.sort(row_keys(np.sort(triangles, axis=1))) for triangles in (one, other)]

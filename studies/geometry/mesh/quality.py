@@ -1,17 +1,17 @@
-"""How well shaped triangles and tetrahedra are."""
+"""Quality measures of triangles and tetrahedra."""
 
 import numpy as np
 
 from studies.geometry.mesh.organ_mesh import tetrahedron_volumes, triangle_areas
 
 MIN_DIHEDRAL, MIN_RATIO = 8.0, 0.1
-"""Below 8 degrees or a radius ratio of 0.1 an element stiffens the body and forces a small time step."""
+"""Dihedral angle [degrees] and radius ratio below which an element stiffens the body and forces a small time step."""
 MIN_WALL_RATIO = 0.05
-"""The same for a thin wall, whose elements are flat by nature."""
+"""Smallest radius ratio in a thin wall, whose elements are flat by nature."""
 
 
 def triangle_radius_ratio(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """2 r_in / r_circum = 16 A^2 / (a b c (a + b + c)), shape (t,): 1 for equilateral, 0 for flat."""
+    """2 r_in / r_circum = 16 A^2 / (a b c (a + b + c)), shape (t,): 1 for an equilateral triangle, 0 for a flat one."""
     a, b, c = points[triangles].transpose(1, 0, 2)
     la, lb, lc = (np.linalg.norm(d, axis=1) for d in (b - c, c - a, a - b))
     area = triangle_areas(points, triangles)
@@ -36,7 +36,7 @@ def tetrahedron_radius_ratio(points: np.ndarray, tetrahedra: np.ndarray) -> np.n
 
 
 def dihedral_angles(points: np.ndarray, tetrahedra: np.ndarray) -> np.ndarray:
-    """The six angles between faces [degrees], shape (k, 6)."""
+    """The six dihedral angles [degrees] of each tetrahedron, shape (k, 6)."""
     x = points[tetrahedra]
     normals = []
     for i, j, k in ((1, 2, 3), (0, 3, 2), (0, 1, 3), (0, 2, 1)):

@@ -15,22 +15,23 @@ from studies.geometry.shape.levelset import Shape, at_depth, project
 from studies.geometry.shape.regions import Region, region_from_dict
 
 GOOD = 0.1
-"""Elements whose Jacobian may fall below this fraction of the straight one get their inner mid-side nodes moved."""
+"""If the Jacobian of an element may fall below this fraction of the straight one, its inner mid-side nodes move."""
 ROUNDS = 30
 REACH = (0.2, 0.1, 0.04, 0.01, 0.003)
 """Trial moves in lengths of the edge."""
 MOST_BAD = 0.05
-"""Share of such elements beyond which single nodes cannot repair the mesh."""
+"""Share of such elements beyond which moves of single nodes cannot repair the mesh."""
 
 
 @dataclass(frozen=True, eq=False)
 class CurvedMesh:
-    """Quadratic tetrahedra whose boundary nodes lie on the true surface.
+    """Quadratic tetrahedra whose mid-side nodes on the boundary lie on the true surface.
 
-    The surface is met to O(h^3), the volume to O(h^4); no element is folded anywhere, unless that was allowed.
+    If the vertices lie on it too, the error of the surface is O(h^3) and that of the volume O(h^4). No element is
+    folded anywhere, unless that was allowed.
 
     points: [m], shape (n2, 3); the vertices, numbered as in the straight mesh, come first
-    cells: shape (k, 10), vertices and mid-side nodes in VTK's order of a quadratic tetrahedron
+    cells: shape (k, 10), vertices and mid-side nodes in the order of the quadratic tetrahedron of VTK
     vertex_count: number of vertices
     """
 
@@ -45,12 +46,12 @@ class CurvedMesh:
 
     @property
     def smallest_jacobian(self) -> float:
-        """Lower bound of the Jacobian over that of the straight element; positive: no element is folded anywhere."""
+        """Lower bound of the Jacobian over that of the straight element [1]; if positive, no element is folded."""
         return float(smallest_jacobian(self.points, self.cells).min())
 
 
 def true_surfaces(mesh: OrganMesh, shape: Shape | None = None) -> list[tuple[np.ndarray, Shape]]:
-    """Triangles (t, 3) of each curved part of the boundary and the shape on whose f = 0 they lie.
+    """Triangles (t, 3) of each curved part of the boundary, and the shape whose f = 0 they approximate.
 
     shape: the true shape of a scan, which its recipe does not contain. Raises StudyError for a mesh whose true shape is
     unknown.
@@ -71,7 +72,7 @@ def true_surfaces(mesh: OrganMesh, shape: Shape | None = None) -> list[tuple[np.
 
 
 def true_outlines(mesh: OrganMesh) -> list[tuple[np.ndarray, Region]]:
-    """Of each attachment the edges (e, 2) of its outline, and the region on whose level = 0 they lie."""
+    """The edges (e, 2) of the outline of each attachment, and the region whose level = 0 they approximate."""
     outlines = []
     for name, data in mesh.recipe.get("regions", {}).items():
         half = mesh.patch_triangles(name)[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
@@ -81,10 +82,11 @@ def true_outlines(mesh: OrganMesh) -> list[tuple[np.ndarray, Region]]:
 
 
 def make_curved(mesh: OrganMesh, may_fold: bool = False, shape: Shape | None = None) -> CurvedMesh:
-    """The second-order mesh of a filled organ, its boundary on the true surfaces and outlines, the rest moved along.
+    """The second-order mesh of a filled organ.
 
-    Raises StudyError for a mesh without tetrahedra or true shape, or (unless it `may_fold`) too coarse to be curved
-    unfolded.
+    Mid-side nodes of the boundary lie on the true surfaces and outlines; the inner ones follow them. shape: as in
+    `true_surfaces`. Raises StudyError for a mesh without tetrahedra or true shape, and (unless `may_fold`) for one so
+    coarse that an element folds.
     """
     if not len(mesh.tetrahedra):
         raise StudyError(f"{mesh.name}: only a filled mesh can be curved; ask for fill=True")
@@ -118,10 +120,11 @@ def make_curved(mesh: OrganMesh, may_fold: bool = False, shape: Shape | None = N
 
 
 def spread(mesh: OrganMesh, middle: np.ndarray, moved: np.ndarray, fixed: np.ndarray) -> np.ndarray:
-    """Displacements [m], shape (e, 3), of all mid-side nodes from those of the fixed ones: the harmonic extension.
+    """Harmonic extension of the displacements of fixed mid-side nodes to all of them [m], shape (e, 3).
 
-    middle (k, 6): the mid-side nodes of each tetrahedron. Minimises the integral of |grad u|^2 with the vertices at
-    rest, which is as well conditioned on a fine mesh as on a coarse one.
+    middle (k, 6): mid-side nodes of each tetrahedron; moved (e, 3) [m]; fixed (e,) bool. It minimises the integral of
+    |grad u|^2 with the vertices at rest, so its condition number does not grow with refinement. Raises StudyError if
+    the linear solver fails.
     """
     count = len(moved)
     rows, columns = np.repeat(middle, 6, axis=1).ravel(), np.tile(middle, (1, 6)).ravel()
@@ -161,7 +164,10 @@ def middle_stiffness(points: np.ndarray, tetrahedra: np.ndarray) -> np.ndarray:
 
 
 def unfold(points: np.ndarray, cells: np.ndarray, movable: np.ndarray) -> np.ndarray:
-    """Points with the movable mid-side nodes of nearly folded elements moved to where the elements around fold less."""
+    """The points after the movable mid-side nodes of nearly folded elements moved to reduce the folds around them.
+
+    points (n, 3) [m], cells (k, 10), movable (n,) bool.
+    """
     points = points.copy()
     trials = trial_moves(REACH)
     for _ in range(ROUNDS):
@@ -177,7 +183,7 @@ def unfold(points: np.ndarray, cells: np.ndarray, movable: np.ndarray) -> np.nda
 
 
 def move_middle(points: np.ndarray, cells: np.ndarray, node: int, trials: np.ndarray) -> bool:
-    """Move one mid-side node, in place, to the best of the trial moves (m, 3), in edge lengths; whether one helps."""
+    """Moves one mid-side node, in place, by the best of the trial moves (m, 3) [edge lengths]; False if none helps."""
     around = cells[(cells[:, 4:] == node).any(axis=1)]
     slot = int(np.flatnonzero(around[0] == node)[0]) - 4
     i, j = PAIRS[slot]
@@ -195,6 +201,6 @@ def move_middle(points: np.ndarray, cells: np.ndarray, node: int, trials: np.nda
 def fold_cost(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
     """Sum of exp(-c / GOOD) over the scaled coefficients c of the Jacobian, shape (k,).
 
-    Smooth, unlike the smallest coefficient, at which moves of single nodes get stuck where several are equal.
+    It is smooth, unlike the smallest coefficient, with which moves of single nodes get stuck if several are equal.
     """
     return np.exp(-scaled_coefficients(points, cells) / GOOD).sum(axis=1)

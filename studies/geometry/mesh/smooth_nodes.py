@@ -1,4 +1,4 @@
-"""Moves single nodes to positions at which their worst tetrahedron is better."""
+"""Moves single nodes to positions where their worst tetrahedron is better."""
 
 from collections.abc import Callable
 
@@ -11,17 +11,17 @@ REACH = (0.3, 0.1, 0.03)
 """Trial moves in fractions of the mean distance to the neighbours."""
 
 Bring = Callable[[np.ndarray, np.ndarray], np.ndarray]
-"""(nodes (k,), points (k, 3)) -> points (k, 3): back onto the surface that these nodes have to stay on."""
+"""(nodes (k,), points (k, 3) [m]) -> points (k, 3) [m]: projects onto the surface on which these nodes stay."""
 
 
 def mend_nodes(
     points: np.ndarray, tetrahedra: np.ndarray, movable: np.ndarray, bring: Bring, least: float
 ) -> np.ndarray:
-    """Points (n, 3) [m] with movable nodes of tetrahedra below the `least` radius ratio moved, worst first.
+    """Points (n, 3) [m] after the movable nodes (n,) bool of tetrahedra below the radius ratio `least` moved.
 
-    movable (n,) bool. Each node tries 26 directions at three lengths, is brought back onto its surface, and stays
-    where the worst of its tetrahedra is best. No tetrahedron that was better than the worst around it becomes worse
-    than that worst one.
+    The nodes of the worst tetrahedron come first. Each node tries 26 directions with three lengths, is projected back
+    onto its surface by `bring`, and takes the position where the worst of its tetrahedra is best. So the smallest
+    radius ratio around a node never falls.
     """
     points = points.copy()
     trials = trial_moves(REACH)
@@ -38,7 +38,7 @@ def mend_nodes(
 
 
 def trial_moves(reaches: tuple[float, ...]) -> np.ndarray:
-    """Moves, shape (26 r, 3), of each of the given lengths towards the faces, edges and corners of a cube."""
+    """Moves, shape (26 r, 3), with each of r lengths towards the faces, edges and corners of a cube."""
     directions = np.stack(np.meshgrid(*[[-1.0, 0.0, 1.0]] * 3), axis=-1).reshape(-1, 3)
     directions = directions[np.abs(directions).sum(axis=1) > 0]
     directions /= np.linalg.norm(directions, axis=1)[:, None]
@@ -46,12 +46,15 @@ def trial_moves(reaches: tuple[float, ...]) -> np.ndarray:
 
 
 def move_node(points: np.ndarray, tetrahedra: np.ndarray, node: int, trials: np.ndarray, bring: Bring) -> bool:
-    """Move one node, in place, to the best of the trial moves (m, 3); whether one is better than staying."""
+    """Moves one node, in place, by the best of the trial moves (m, 3) [mean distances to its neighbours].
+
+    Returns False if none is better than staying.
+    """
     around = tetrahedra[(tetrahedra == node).any(axis=1)]
     neighbours = np.setdiff1d(around, node)
     scale = np.linalg.norm(points[neighbours] - points[node], axis=1).mean()
     places = bring(np.full(len(trials), node), points[node] + scale * trials)
-    # One copy of the star per trial, all judged in one call.
+    # One copy of the star per trial, evaluated in one call.
     corners = np.where((around == node)[None, :, :, None], places[:, None, None, :], points[around][None])
     stars = np.arange(4 * len(trials) * len(around)).reshape(-1, 4)
     worst = tetrahedron_radius_ratio(corners.reshape(-1, 3), stars).reshape(len(trials), -1).min(axis=1)

@@ -1,8 +1,8 @@
 """The wall of a hollow organ: layers of prisms between its surface and its lumen, cut into tetrahedra.
 
-A wall thinner than the edges of the mesh cannot be filled well by a general mesher. Here every node of the outer
-surface has a partner on the lumen, so the fill conforms by construction and its elements are as good as the wall is
-thick against the edges.
+A general mesher cannot fill well a wall that is thinner than the edges of the mesh. Here every node of the outer
+surface has a partner on the lumen, so the fill conforms by construction, and the quality of its elements depends mainly
+on the ratio of wall thickness to edge length.
 """
 
 from itertools import pairwise
@@ -16,19 +16,19 @@ from studies.geometry.mesh.smooth_nodes import mend_nodes
 from studies.geometry.shape.levelset import Shape, at_depth, project
 
 LONGEST_STEP = 0.5
-"""Of the mean edge: how far the surface moves inwards at a time, before its normals are taken again."""
+"""Largest inward step of the surface, in mean edges, before its normals are computed again."""
 GOOD_WALL_RATIO = 0.2
-"""Elements under this radius ratio get their inner nodes moved."""
+"""Radius ratio below which the nodes of an element are moved, except those of the outer surface."""
 MOST_LAYERS = 12
 
 
 def suggested_layers(points: np.ndarray, triangles: np.ndarray, wall: float) -> int:
-    """Layers of a wall [m] that make prisms about as high as their edges are long, at least one."""
+    """Number of layers, 1 to MOST_LAYERS, that makes the prisms of a wall [m] about as high as their edges are long."""
     return int(np.clip(round(wall / mean_edge(points, triangles)), 1, MOST_LAYERS))
 
 
 def mean_edge(points: np.ndarray, triangles: np.ndarray) -> float:
-    """Mean length of the edges [m]."""
+    """Mean length [m] of the edges of triangles (t, 3)."""
     edges = unique_edges(triangles)
     return float(np.linalg.norm(points[edges[:, 0]] - points[edges[:, 1]], axis=1).mean())
 
@@ -38,9 +38,10 @@ def fill_wall(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Points (n (layers + 1), 3) [m], triangles (2 t, 3) and tetrahedra (3 layers t, 4) of the wall of a hollow shape.
 
-    points (n, 3) on f = 0 and triangles (t, 3) are the outer surface and come first; then the lumen's, node i + n
-    facing node i; then the layers between, from outside. Lumen triangles look into the lumen, out of the tissue.
-    Raises StudyError for a wall that does not fit into the organ, or not at this size of edges.
+    points (n, 3) [m] on f = 0 and triangles (t, 3) are the outer surface. Its nodes come first; then those of the
+    lumen, whose node i + n faces node i; then those of the layers between them, from outside. The triangles of the
+    lumen look into the lumen, out of the tissue. layers: None: `suggested_layers`. Raises StudyError for a solid shape,
+    for layers outside 1 to MOST_LAYERS, and for a wall that does not fit into the organ or folds or flattens elements.
     """
     if shape.wall is None:
         raise StudyError(f"{shape.name} is solid; give it a wall to make it hollow")
@@ -49,7 +50,7 @@ def fill_wall(
         raise StudyError(f"{shape.name}: {layers} layers asked for its wall; choose 1 to {MOST_LAYERS}")
     rings = offset_rings(shape, points, triangles, layers)
     count = len(points)
-    # Ring k has its nodes at first[k]; the lumen's come second, right behind the surface's.
+    # Nodes of ring k start at first[k]; those of the lumen directly follow those of the outer surface.
     first = np.array([0, *range(2 * count, (layers + 1) * count, count), count])
     tetrahedra = split_prisms(triangles, first)
     everything = mend_wall(shape, np.concatenate([rings[0], rings[-1], *rings[1:-1]]), tetrahedra, layers)
@@ -63,7 +64,7 @@ def fill_wall(
 
 
 def mend_wall(shape: Shape, points: np.ndarray, tetrahedra: np.ndarray, layers: int) -> np.ndarray:
-    """The points with nodes of poor elements moved along their level sets; those of the outer surface stay."""
+    """The points (n (layers + 1), 3) [m] after nodes of poor elements moved on their level sets, except outer nodes."""
     count = len(points) // (layers + 1)
     wall = float(shape.wall or 0.0)
     depths = wall * np.repeat([0.0, 1.0, *np.arange(1, layers) / layers], count)
@@ -77,8 +78,8 @@ def mend_wall(shape: Shape, points: np.ndarray, tetrahedra: np.ndarray, layers: 
 def offset_rings(shape: Shape, points: np.ndarray, triangles: np.ndarray, layers: int) -> list[np.ndarray]:
     """Nodes of the layers from the outer surface (first) to the lumen f = -wall (last), each (n, 3) [m].
 
-    Short steps along the normals of the triangulation, not of f: in a crease they fan out less. Each step ends on its
-    level exactly.
+    The nodes take short steps along the normals of the triangulation, which fan out less in a crease than those of f.
+    Each step ends exactly on its level. Raises StudyError for a wall that does not fit into the shape.
     """
     wall = float(shape.wall or 0.0)
     steps = max(1, int(np.ceil(wall / layers / (LONGEST_STEP * mean_edge(points, triangles)))))
@@ -101,8 +102,9 @@ def offset_rings(shape: Shape, points: np.ndarray, triangles: np.ndarray, layers
 def split_prisms(triangles: np.ndarray, first: np.ndarray) -> np.ndarray:
     """Tetrahedra, shape (3 layers t, 4), of positive volume, of the prisms between rings of nodes.
 
-    triangles (t, 3) outward on the outermost ring; first (layers + 1,): index of each ring's node 0, outermost first.
-    Every quadrilateral is cut from its lower column above to its higher one below, so neighbours agree.
+    triangles (t, 3): outward on the outermost ring; first (layers + 1,): index of node 0 of each ring, outermost first.
+    The diagonal of every quadrilateral joins the outer node of its lower column number to the inner node of the higher
+    one, so neighbours agree.
     """
     columns = np.sort(triangles, axis=1)
     even = (np.argsort(triangles, axis=1, kind="stable") * [1, 3, 9]).sum(axis=1)
@@ -117,7 +119,7 @@ def split_prisms(triangles: np.ndarray, first: np.ndarray) -> np.ndarray:
             np.stack([a + above, b + below, c + below, a + below], axis=1),
         ]
     tetrahedra = np.concatenate(cells)
-    # With outward triangles the fourth node lies behind the first three: turn them.
+    # With outward triangles the fourth node lies behind the first three, so two of them are swapped.
     turned = np.tile(even, len(cells))
     tetrahedra[turned] = tetrahedra[turned][:, [0, 2, 1, 3]]
     return tetrahedra

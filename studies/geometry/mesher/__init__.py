@@ -1,1 +1,1 @@
-"""The worker process that meshes a recipe; gmsh is called here only."""
+"""The worker process that meshes a recipe, and the jobs that start it; only this package calls gmsh and MMG."""

@@ -8,17 +8,18 @@ from studies.geometry.mesher.gmsh_calls import fill_once
 
 DELAUNAY, FRONTAL, HXT = 1, 4, 10
 MANY = 3000
-"""Surface nodes beyond which the fill is graded: elements grow inwards, or most would lie where nothing happens."""
+"""Surface nodes beyond which the fill is graded, that is, elements grow inwards; else most would lie deep inside."""
 FEW_ATTEMPTS = ((DELAUNAY, True, False), (FRONTAL, True, False), (HXT, False, False))
 MANY_ATTEMPTS = ((HXT, False, True), (DELAUNAY, False, True), (HXT, False, False))
-"""Algorithm, Netgen's optimiser, graded. Netgen doubles the worst angle but takes seconds where elements are many."""
+"""(algorithm, whether the Netgen optimiser runs, whether graded). Netgen doubles the worst angle, but takes seconds for
+many elements."""
 
 
 def fill_surface(points: np.ndarray, triangles: np.ndarray, strict: bool = True) -> tuple[np.ndarray, np.ndarray]:
-    """All points (n, 3) [m], the surface's first, and good tetrahedra (k, 4) inside a closed surface.
+    """Fills a closed surface: all points (n, 3) [m], those of the surface first, and tetrahedra (k, 4).
 
-    Several algorithms are tried in a fixed order until the worst element is good enough. Raises StudyError when all
-    fail, or, when strict, the best is still worse than MIN_DIHEDRAL or MIN_RATIO.
+    It tries several algorithms in a fixed order until the worst element is good enough, and takes the best fill. Raises
+    StudyError if all fail, and, if `strict`, for an element worse than MIN_DIHEDRAL or MIN_RATIO.
     """
     attempts, enough = (FEW_ATTEMPTS, 1.5) if len(points) <= MANY else (MANY_ATTEMPTS, 1.25)
     best: tuple[float, np.ndarray, np.ndarray] | None = None
@@ -46,7 +47,7 @@ def fill_surface(points: np.ndarray, triangles: np.ndarray, strict: bool = True)
 
 
 def fill_score(points: np.ndarray, tetrahedra: np.ndarray) -> float:
-    """Worst dihedral angle and radius ratio in units of their limits, the smaller of the two; 1 is just acceptable."""
+    """The smaller of worst dihedral angle and worst radius ratio, each over its limit [1]; 1 is just acceptable."""
     angle = dihedral_angles(points, tetrahedra).min() / MIN_DIHEDRAL
     ratio = tetrahedron_radius_ratio(points, tetrahedra).min() / MIN_RATIO
     return float(min(angle, ratio))

@@ -1,4 +1,4 @@
-"""All calls of gmsh. Runs in the worker process only: gmsh may hang or crash, and is not safe with other threads."""
+"""General calls of gmsh, in the worker process only: gmsh may hang or crash, and is not thread-safe."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -15,9 +15,10 @@ TRIANGLE, TETRAHEDRON = 2, 4
 
 @contextmanager
 def fresh_model(seed: int = 1, **options: float) -> Iterator[None]:
-    """A new gmsh session with default options. Options would survive `clear`, so the session is finalised at the end.
+    """A new gmsh session; `options` such as Mesh_Algorithm=6 set "Mesh.Algorithm", the others have default values.
 
-    One thread, an explicit seed and no user configuration make a mesh a function of its recipe.
+    Options would survive `clear`, so the session is finalised at the end. One thread, an explicit seed and no user
+    configuration make a mesh a function of its recipe. Raises StudyError for an error of gmsh.
     """
     gmsh.initialize(readConfigFiles=False, interruptible=False)
     try:
@@ -32,7 +33,7 @@ def fresh_model(seed: int = 1, **options: float) -> Iterator[None]:
             gmsh.option.setNumber(name, value)
         yield
     except Exception as error:
-        # gmsh raises bare Exception; StudyErrors pass unchanged.
+        # gmsh raises plain Exceptions; a StudyError passes unchanged.
         if type(error) is Exception:
             raise StudyError(f"gmsh gave up: {error}; try another node count, or smooth the surface") from error
         raise
@@ -41,7 +42,7 @@ def fresh_model(seed: int = 1, **options: float) -> Iterator[None]:
 
 
 def add_surface(points: np.ndarray, triangles: np.ndarray) -> int:
-    """Put a triangulation into the model as one discrete surface; returns its tag. Node i gets tag i + 1."""
+    """Adds a triangulation to the model as one discrete surface and returns its tag. Node i gets tag i + 1."""
     tag = gmsh.model.addDiscreteEntity(2)
     gmsh.model.mesh.addNodes(2, tag, np.arange(1, len(points) + 1), points.ravel())
     gmsh.model.mesh.addElementsByType(tag, TRIANGLE, [], (triangles + 1).ravel())
@@ -49,7 +50,7 @@ def add_surface(points: np.ndarray, triangles: np.ndarray) -> int:
 
 
 def read_elements(kind: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Node tags (n,), points (n, 3) and elements (k, m) as indices into the points, used nodes only."""
+    """Tags (n,) and points (n, 3) of the nodes that elements of this kind use, and the elements (k, m) by index."""
     tags, coordinates, _ = gmsh.model.mesh.getNodes()
     _, corners = gmsh.model.mesh.getElementsByType(kind)
     width = 3 if kind == TRIANGLE else 4
@@ -60,7 +61,7 @@ def read_elements(kind: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 class Remesher:
-    """A surface parametrised once, meshed at as many sizes as wanted. Use inside `fresh_model`."""
+    """A surface that is parametrised once and meshed with any number of sizes. Use inside `fresh_model`."""
 
     def __init__(self, points: np.ndarray, triangles: np.ndarray):
         """Parametrise a closed triangulation: points (n, 3) [m], triangles (t, 3)."""
@@ -72,7 +73,7 @@ class Remesher:
         self.regions: list[Region] = []
 
     def finer_in(self, regions: list[Region]) -> None:
-        """From now on edges in the regions are half as long as elsewhere; without regions no more."""
+        """From now on edges in the regions are half as long as elsewhere; [] makes them even again."""
         self.regions = regions
         if not regions:
             gmsh.model.mesh.removeSizeCallback()
@@ -92,7 +93,7 @@ class Remesher:
         return points, triangles
 
     def size_at(self, size: float, point: np.ndarray) -> float:
-        """Length of edges [m] at a point (1, 3): half of `size` in the regions, all of it twice that length away."""
+        """Edge length [m] at a point (1, 3) [m]: half of `size` in the regions, rising to `size` at level 2 `size`."""
         outside = min(float(region.level(point)[0]) for region in self.regions)
         return size * (0.5 + 0.25 * min(max(outside / size, 0.0), 2.0))
 
@@ -100,10 +101,10 @@ class Remesher:
 def fill_once(
     points: np.ndarray, triangles: np.ndarray, algorithm: int, netgen: bool, graded: bool
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Tetrahedra inside a closed surface: all points, the surface's first and unchanged, and tetrahedra (k, 4).
+    """Fills a closed surface: all points (n, 3) [m], those of the surface first and unchanged, and tetrahedra (k, 4).
 
-    graded: elements grow from the surface inwards instead of staying as small as the facets.
-    Raises StudyError when gmsh fails or does not keep the surface node by node.
+    algorithm: number of gmsh's Mesh.Algorithm3D; netgen: whether the Netgen optimiser runs; graded: whether elements
+    grow inwards. Raises StudyError if gmsh fails or changes a node or triangle of the surface.
     """
     with fresh_model(Mesh_Algorithm3D=algorithm, Mesh_Optimize=1, Mesh_OptimizeNetgen=float(netgen)):
         surface = add_surface(points, triangles)
@@ -125,7 +126,7 @@ def fill_once(
 
 
 def grow_inwards(surface: int, points: np.ndarray) -> None:
-    """Let the size of elements grow from that of the facets to an eighth of the body's least extent in its middle."""
+    """Lets elements grow inwards from the size of the facets to an eighth of the smallest extent of the body."""
     extent = float(np.ptp(points, axis=0).min())
     field = gmsh.model.mesh.field.add("Extend")
     gmsh.model.mesh.field.setNumbers(field, "SurfacesList", [surface])

@@ -1,4 +1,4 @@
-"""Meshes by recipe: from the cache, or made by the worker process under a time limit."""
+"""Meshes from recipes: read from the cache, or made by the worker process with a time limit."""
 
 import hashlib
 import json
@@ -24,30 +24,31 @@ from studies.geometry.mesher.process import STOPPED, followed
 from studies.geometry.shape.regions import ON_CURVE, region_from_dict
 
 TIME_LIMIT = 300.0
-"""Seconds of processor time after which a meshing job is given up: 20 times what the largest one takes."""
+"""Processor time [s] after which a meshing job is stopped: 20 times that of the largest one."""
 NAME_BYTES = 80
-"""Of a mesh's name that stand in the name of its file: file systems allow 255 in all."""
+"""Most bytes of the name of a mesh in the name of its file; file systems allow 255 in all."""
 PARTS = ("points", "triangles", "tetrahedra", "surface_count", "outer_count")
-"""What the worker makes and the cache keeps."""
+"""Names of the arrays that the worker makes and the cache stores."""
 LEVEL = ("low", "cell", "values", "losses")
-"""The same of a recipe of kind "level": corner [m], edge of the cells [m] and distances [m] of a grid; its losses."""
+"""The same for a recipe of kind "level": corner [m], cell edge [m] and distances [m] of a grid, and its losses."""
 
 MADE_ELSEWHERE = {
     "scan": "studies.geometry.mesher.scan_recipe",
     "level": "studies.geometry.mesher.scan_recipe",
     "curved": "studies.geometry.mesh.second_order",
 }
-"""Kinds of recipes that the module of all others does not make."""
+"""Modules of the kinds of recipes that organ_recipe does not make."""
 MAKERS = ("studies.geometry.mesher.organ_recipe", *dict.fromkeys(MADE_ELSEWHERE.values()))
-"""Modules that make meshes, some in separate processes, so that no import refers to them."""
+"""Modules that make meshes. Some run in a separate process, so no import refers to them."""
 
 
 def mesh_from(
     recipe: dict[str, Any], arrays: dict[str, np.ndarray] | None = None, limit: float = TIME_LIMIT
 ) -> OrganMesh:
-    """The mesh of a JSON-able recipe (and the arrays it refers to), cached.
+    """The mesh of a JSON-able recipe and the arrays that it needs, cached.
 
-    limit: seconds of processor time the worker may take. Raises StudyError when the mesh cannot be made.
+    limit: processor time of the worker [s]. Raises StudyError if the mesh cannot be made or stored, and for a region
+    without nodes.
     """
     given = arrays or {}
     parts = (*PARTS, "losses") if recipe["kind"] == "scan" else PARTS
@@ -56,7 +57,7 @@ def mesh_from(
 
 
 def surface_of(recipe: dict[str, Any]) -> dict[str, np.ndarray]:
-    """Points and triangles of the surface that the recipe of an organ fills, where the cache has them."""
+    """Points and triangles of the surface that the recipe of an organ fills, if the cache has them; else {}."""
     if recipe["kind"] != "organ" or not recipe["fill"] or cuts_of(recipe):
         return {}
     alone = {key: value for key, value in recipe.items() if key != "layers"} | {"fill": False}
@@ -65,13 +66,16 @@ def surface_of(recipe: dict[str, Any]) -> dict[str, np.ndarray]:
 
 
 def cuts_of(recipe: dict[str, Any]) -> dict[str, dict[str, Any]]:
-    """The cuts of a recipe, by the name that the array of their faces has among its parts."""
+    """Name of the array of the faces of each cut -> the cut in the recipe."""
     cuts = recipe.get("cuts", [recipe["cut"]] if "cut" in recipe else [])
     return {f"cut_faces{k or ''}": cut for k, cut in enumerate(cuts)}
 
 
 def level_of(recipe: dict[str, Any], arrays: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """The grid of the true shape of a scan, whose surface is `arrays`, cached. Raises StudyError."""
+    """The grid of the true shape of a scan, whose surface is `arrays`, cached; the names are those of LEVEL.
+
+    Raises StudyError if it cannot be made or stored.
+    """
     return cached(recipe, arrays, LEVEL, lambda: run_worker(recipe, arrays, TIME_LIMIT))
 
 
@@ -81,7 +85,8 @@ def cached(
     parts: tuple[str, ...],
     make: Callable[[], dict[str, np.ndarray]],
 ) -> dict[str, np.ndarray]:
-    """The arrays called `parts` for a recipe: from the cache, or made and stored there."""
+    """The arrays named `parts` for a recipe: from the cache, or made by `make` and stored. Raises StudyError if they
+    cannot be stored."""
     path = cache_path(recipe, arrays)
     result = read_cached(path, parts)
     if result is None:
@@ -91,7 +96,10 @@ def cached(
 
 
 def to_mesh(recipe: dict[str, Any], arrays: dict[str, np.ndarray]) -> OrganMesh:
-    """The mesh with its patches, and what a scan's way from its file lost."""
+    """The mesh from the arrays of a recipe, with its patches, cuts and losses.
+
+    Raises StudyError for a region without nodes.
+    """
     count, outer = int(arrays["surface_count"]), int(arrays["outer_count"])
     cells = arrays["triangles"], arrays["tetrahedra"]
     losses = json.loads(str(arrays["losses"])) if "losses" in arrays else {}
@@ -102,9 +110,9 @@ def to_mesh(recipe: dict[str, Any], arrays: dict[str, np.ndarray]) -> OrganMesh:
 
 
 def patches_of(mesh: OrganMesh, regions: dict[str, dict[str, Any]]) -> dict[str, np.ndarray]:
-    """Outer nodes inside or on the outline of each region; raises StudyError for a region without nodes."""
+    """Outer nodes inside each region or on its outline. Raises StudyError for a region without nodes."""
     surface = mesh.points[: mesh.outer_count]
-    # Outlines are met to ON_CURVE of the size of the box of the shape, which is somewhat larger than the mesh.
+    # Nodes are on an outline to ON_CURVE of the box of the shape, which is somewhat larger than the mesh.
     tolerance = 10 * ON_CURVE * float(np.linalg.norm(np.ptp(surface, axis=0)))
     patches = {}
     for name, data in regions.items():
@@ -117,7 +125,7 @@ def patches_of(mesh: OrganMesh, regions: dict[str, dict[str, Any]]) -> dict[str,
 
 
 def cache_folder() -> Path:
-    """ORGANBENCH_CACHE when set, else results/cache/meshes where the current folder has results, else the user's."""
+    """ORGANBENCH_CACHE if set, else results/cache/meshes if the current folder has results, else that of the user."""
     given, results = os.environ.get("ORGANBENCH_CACHE"), Path.cwd() / "results"
     if given:
         return Path(given)
@@ -125,13 +133,14 @@ def cache_folder() -> Path:
 
 
 def cache_path(recipe: dict[str, Any], arrays: dict[str, np.ndarray]) -> Path:
-    """Where the cache keeps what is made by a recipe."""
+    """The file in which the cache stores the arrays of a recipe."""
     name = recipe["name"].encode()[:NAME_BYTES].decode(errors="ignore")
     return cache_folder() / f"{name}-{recipe_hash(recipe, arrays)}.npz"
 
 
 def recipe_hash(recipe: dict[str, Any], arrays: dict[str, np.ndarray]) -> str:
-    """Hash of all that decides the mesh: recipe, given arrays, our code, the mesher's version."""
+    """Hash, 16 hexadecimal digits, of all that decides the mesh: recipe, given arrays, our code, versions of
+    libraries."""
     digest = hashlib.sha256(code_hash(recipe["kind"]).encode())
     digest.update(json.dumps(recipe, sort_keys=True).encode())
     for key in sorted(arrays):
@@ -143,7 +152,7 @@ def recipe_hash(recipe: dict[str, Any], arrays: dict[str, np.ndarray]) -> str:
 
 @lru_cache
 def code_hash(kind: str) -> str:
-    """Hash of the code that makes a kind of recipe, and of the versions of the libraries that decide a mesh."""
+    """Fingerprint of the code that makes a kind of recipe, and the versions of the libraries that decide a mesh."""
     versions = " ".join(version(name) for name in ("gmsh", "mmgpy", "scikit-image", "numpy", "scipy"))
     return f"{source_fingerprint(maker(kind))} {versions}"
 
@@ -154,7 +163,7 @@ def maker(kind: str) -> str:
 
 
 def read_cached(path: Path, parts: tuple[str, ...]) -> dict[str, np.ndarray] | None:
-    """The stored arrays, or None when there are none or the file is damaged (a warning names it)."""
+    """The stored arrays, or None if there is no file or it is damaged. Warns of a damaged file."""
     if not path.exists():
         return None
     try:
@@ -166,7 +175,10 @@ def read_cached(path: Path, parts: tuple[str, ...]) -> dict[str, np.ndarray] | N
 
 
 def write_cached(path: Path, arrays: dict[str, np.ndarray]) -> None:
-    """Stores under a temporary name, then renames, so that another process sees the whole file or none."""
+    """Stores arrays under a temporary name and renames the file, so that another process sees all of it or none.
+
+    Raises StudyError if it cannot be stored.
+    """
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.NamedTemporaryFile(dir=path.parent, prefix=path.stem, suffix=".part", delete=False) as part:
@@ -180,8 +192,10 @@ def write_cached(path: Path, arrays: dict[str, np.ndarray]) -> None:
 
 
 def run_worker(recipe: dict[str, Any], arrays: dict[str, np.ndarray], limit: float) -> dict[str, np.ndarray]:
-    """Run the worker on a job and read what it made; raises StudyError for its sentence, a crash, or when it has used
-    `limit` seconds of processor time."""
+    """Runs the worker on a job and returns the arrays that it made.
+
+    Raises StudyError with the message of the worker, for a crash, and after `limit` seconds of processor time.
+    """
     with tempfile.TemporaryDirectory() as folder:
         job, out = Path(folder, "job.npz"), Path(folder, "out.npz")
         np.savez(job, allow_pickle=False, recipe=np.array(json.dumps(recipe)), **arrays)
@@ -201,7 +215,7 @@ def run_worker(recipe: dict[str, Any], arrays: dict[str, np.ndarray], limit: flo
 
 
 def wayout(recipe: dict[str, Any]) -> str:
-    """What a person can do about a mesh that could not be made."""
+    """Advice for a mesh that could not be made."""
     if recipe["kind"] in ("scan", "level"):
         return "smooth the surface (--smooth 3), or ask for another node count"
     return "repair the surface, or make a new one (--nodes N)" if recipe["kind"] == "fill" else "try another node count"

@@ -1,8 +1,8 @@
-"""All calls of MMG, which makes a triangulation even by splitting, collapsing and turning edges. Worker process only.
+"""All calls of MMG, which makes a triangulation even by splitting, collapsing and flipping edges. Worker process only.
 
-It needs no map of the surface onto a plane, so thin flaps and margins, on which gmsh's maps fold and its mesher then
-hardly ends, are nothing special to it. C. Dapogny, C. Dobrzynski, P. Frey: Three-dimensional adaptive domain
-remeshing, implicit domain meshing, and applications to free and moving boundary problems, J. Comput. Phys. 262, 2014.
+MMG needs no map of the surface onto a plane, so it handles thin flaps and margins, on which the maps of gmsh fold and
+its mesher hardly ends. C. Dapogny, C. Dobrzynski, P. Frey: Three-dimensional adaptive domain remeshing, implicit domain
+meshing, and applications to free and moving boundary problems, J. Comput. Phys. 262, 2014.
 """
 
 import mmgpy
@@ -11,15 +11,15 @@ import numpy as np
 Surface = tuple[np.ndarray, np.ndarray]
 QUIET = -1
 NO_RIDGES = 0
-"""No angle between triangles counts as a ridge to be kept: the facets of a scan are accidents."""
+"""No angle between triangles is kept as a ridge, because the facets of a scan are arbitrary."""
 
 
 class EvenRemesher:
-    """A surface meshed at as many sizes as wanted."""
+    """A surface that is meshed with any number of sizes."""
 
     def __init__(self, points: np.ndarray, triangles: np.ndarray, nearness: float):
-        """A closed outward triangulation: points (n, 3) [m], triangles (t, 3); nearness: how far an edit may leave it,
-        over the size."""
+        """points (n, 3) [m], triangles (t, 3): a closed outward triangulation; nearness: largest distance of an edit
+        from it, over the edge length."""
         self.nearness = nearness
         self.points, self.triangles = np.ascontiguousarray(points), np.ascontiguousarray(triangles, dtype=np.int32)
 

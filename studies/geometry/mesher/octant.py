@@ -1,4 +1,4 @@
-"""One eighth of a ball, fine where it will be touched: what three planes of symmetry leave to compute."""
+"""One eighth of a ball, fine at the contact: three planes of symmetry make the rest unnecessary."""
 
 from typing import Any
 
@@ -10,9 +10,10 @@ from studies.geometry.mesher.gmsh_calls import TETRAHEDRON, fresh_model, read_el
 
 
 def build_octant(recipe: dict[str, Any], arrays: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Octant x, y, z >= 0 of the ball of `radius` [m]: element size `h_pole` [m] at (0, 0, radius), growing to `h` [m].
+    """Octant x, y, z >= 0 of the ball of `radius` [m]: the arrays of jobs.PARTS.
 
-    Planes of symmetry are exactly at coordinate 0 and nodes of the sphere at distance `radius` to rounding.
+    The element size grows from `h_pole` [m] at (0, 0, radius) to `h` [m] at a distance of one radius. Nodes of the
+    planes of symmetry have exactly coordinate 0, and nodes of the sphere the distance `radius` up to rounding.
     """
     radius, h, h_pole = recipe["radius"], recipe["h"], recipe["h_pole"]
     with fresh_model(Mesh_Algorithm3D=1, Mesh_Optimize=1, Mesh_OptimizeNetgen=1, Mesh_MeshSizeExtendFromBoundary=0):

@@ -1,4 +1,4 @@
-"""Making a mesh from its recipe, inside the worker process. The same recipe gives the same mesh bit for bit."""
+"""Makes a mesh from its recipe in the worker process. The same recipe gives the same mesh bit for bit."""
 
 import sys
 from typing import Any
@@ -24,16 +24,16 @@ from studies.geometry.surface.volume import with_volume
 
 
 def build(recipe: dict[str, Any], arrays: Arrays) -> Arrays:
-    """The arrays of jobs.PARTS for a recipe; `arrays` holds a given surface for kind "fill", and for kind "organ" the
-    one that was made before by the same recipe without "fill".
+    """The arrays of jobs.PARTS for a recipe of kind "organ", "fill" or "ball_octant".
 
-    Raises StudyError when the recipe cannot be made.
+    arrays: points and triangles of the surface to fill; for kind "organ" that of the same recipe without "fill", or
+    nothing. Raises StudyError if the mesh cannot be made.
     """
     return {"organ": build_organ, "fill": build_fill, "ball_octant": build_octant}[recipe["kind"]](recipe, arrays)
 
 
 def build_organ(recipe: dict[str, Any], arrays: Arrays) -> Arrays:
-    """An organ of SHAPES with `nodes` surface nodes, its outlines of regions snapped, filled when asked."""
+    """An organ of SHAPES with `nodes` surface nodes and the outlines of its regions, filled if the recipe says so."""
     shape = make_shape(recipe["organ"], recipe["parameters"])
     if arrays:
         return finish(shape, arrays["points"], arrays["triangles"], recipe)
@@ -41,9 +41,10 @@ def build_organ(recipe: dict[str, Any], arrays: Arrays) -> Arrays:
 
 
 def mesh_shape(shape: Shape, recipe: dict[str, Any]) -> Arrays:
-    """Any shape by the `nodes`, `regions`, `sides`, `fill` and `layers` of a recipe; hollow when the shape has a wall.
+    """A mesh of any shape by the `nodes`, `regions`, `sides`, `exact`, cuts, `fill` and `layers` of a recipe.
 
-    sides: "straight" or "curved", those that are to follow the shape; without, nodes are evenly spread.
+    It is hollow if the shape has a wall. With sides "straight" or "curved" nodes are placed so that sides of this kind
+    follow the shape; without, they are evenly spread.
     """
     held = [region_from_dict(data) for data in recipe["regions"].values()]
     cuts = cuts_of(recipe)
@@ -61,8 +62,10 @@ def mesh_shape(shape: Shape, recipe: dict[str, Any]) -> Arrays:
 
 
 def finish(shape: Shape, points: np.ndarray, triangles: np.ndarray, recipe: dict[str, Any]) -> Arrays:
-    """A surface on f = 0, filled as its recipe says; for a scan elements of lower quality are accepted, since folds may
-    not allow better ones."""
+    """The arrays of a surface of the shape, filled if the recipe says so.
+
+    For a scan elements of lower quality are accepted, because its folds may not allow better ones.
+    """
     check_surface(points, triangles, shape.name)
     stage("filling")
     if not recipe["fill"]:
@@ -84,12 +87,15 @@ def finish(shape: Shape, points: np.ndarray, triangles: np.ndarray, recipe: dict
 
 
 def has_exact_volume(recipe: dict[str, Any]) -> bool:
-    """Whether the mesh has the volume of its shape, its nodes a little off it: of a scan, or of an organ on request."""
+    """Whether the mesh gets the volume of its shape, with nodes slightly off it: a scan, or an organ with `exact`."""
     return recipe["kind"] == "scan" or recipe.get("exact", False)
 
 
 def with_lumen_volume(shape: Shape, points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Points (n, 3) [m] of a wall whose lumen, behind the outer `triangles` (t, 3), has its true volume."""
+    """Points (n, 3) [m] of a wall, with the nodes of the lumen moved so that it has its true volume.
+
+    triangles (t, 3): of the outer surface.
+    """
     count, inner = int(triangles.max()) + 1, at_depth(shape, shape.wall or 0.0)
     points = points.copy()
     lumen = points[count : 2 * count]
@@ -98,7 +104,7 @@ def with_lumen_volume(shape: Shape, points: np.ndarray, triangles: np.ndarray) -
 
 
 def build_fill(recipe: dict[str, Any], arrays: Arrays) -> Arrays:
-    """A given surface, filled as well as its triangles allow."""
+    """A given surface, filled as well as its triangles allow. Raises StudyError if it intersects itself."""
     points, triangles = arrays["points"], arrays["triangles"]
     crossing = len(crossing_triangles(points, triangles))
     if crossing:
@@ -114,7 +120,7 @@ def build_fill(recipe: dict[str, Any], arrays: Arrays) -> Arrays:
 def arrays_of(
     points: np.ndarray, triangles: np.ndarray, tetrahedra: np.ndarray, surface_count: int, outer_count: int
 ) -> Arrays:
-    """What the worker hands over, by the names of jobs.PARTS."""
+    """The result of the worker by the names of jobs.PARTS."""
     counts = {"surface_count": np.array(surface_count), "outer_count": np.array(outer_count)}
     return {"points": points, "triangles": triangles, "tetrahedra": tetrahedra, **counts}
 

@@ -1,4 +1,4 @@
-"""The surface of an organ with a wanted number of nodes: evenly spread, or where its shape needs them."""
+"""The surface of an organ with a given number of nodes: evenly spread, or where its shape needs them."""
 
 import numpy as np
 
@@ -15,18 +15,19 @@ from studies.geometry.surface.node_count import FEWEST, Surface, surface_with
 from studies.geometry.surface.snap import outlined, relax
 
 NEARNESS = 0.2
-"""Distance to the first triangulation, over the size, that MMG keeps to."""
+"""Largest distance of MMG from the first triangulation, over the edge length."""
 SPARES = (0.22, 0.1, 0.18, 0.26, 0.14)
-"""Shares of the nodes that are put where even ones leave the surface farthest from its shape, tried in turn."""
+"""Shares of spare nodes, tried in turn. They go where the surface of the even nodes is farthest from its shape."""
 MOST_SPARE = 120
-"""So many at most: where shares of a large mesh are more, its even nodes are near the shape already."""
+"""Most spare nodes: the even nodes of a large mesh are near the shape already."""
 
 
 def close_surface(shape: Shape, nodes: int, regions: list[Region], curved: bool) -> Surface:
-    """A surface with `nodes` nodes that follows its shape, every region's outline on its edges: even where that is near
-    enough, else the nearest that spare nodes make. curved: the sides will be quadratic, their middles on f = 0.
+    """A surface with `nodes` nodes that follows its shape, with the outline of every region on its edges.
 
-    Raises StudyError when none is well shaped."""
+    The nodes are even if that is near enough to the shape; else it is the nearest surface of those with spare nodes.
+    curved: the sides will be quadratic, with mid-side nodes on f = 0. Raises StudyError if none is well shaped.
+    """
     truth = first_surface(shape)
     with fresh_model():
         remesher = Remesher(*truth)
@@ -45,8 +46,10 @@ def close_surface(shape: Shape, nodes: int, regions: list[Region], curved: bool)
 def follow(
     shape: Shape, nodes: int, regions: list[Region], remesher: Remesher, truth: Surface, curved: bool, spare: float
 ) -> Fit | None:
-    """A surface of which the share `spare` of its nodes is where its shape needs them; None where edges stay too long
-    for one of the regions."""
+    """A surface with the share `spare` of its nodes where its shape needs them.
+
+    None if no surface with `nodes` nodes is well shaped and has edges short enough for all regions.
+    """
     for finer in ([], regions):
         try:
             base = base_surface(
@@ -54,7 +57,7 @@ def follow(
             )
             made = fitted(shape, base, nodes, regions, truth, curved)
         except StudyError:
-            # Not lost: shorter edges in the regions, another share or the even surface follow.
+            # No failure yet: shorter edges in the regions, another share or the even surface follow.
             continue
         if len(made.points) == nodes and all(is_met(region, *made.surface) for region in regions):
             return made
@@ -62,10 +65,10 @@ def follow(
 
 
 def base_surface(shape: Shape, remesher: Remesher, start: Surface, nodes: int, finer: list[Region]) -> Surface:
-    """An even surface with `nodes` nodes and no outline, its edges half as long in the regions `finer`; remesher: of
-    `start`, a fine surface.
+    """An even surface with `nodes` nodes without outlines, with edges half as long in the regions `finer`.
 
-    Raises StudyError when none is well shaped."""
+    remesher: of `start`, a fine surface. Raises StudyError if none is well shaped.
+    """
     remesher.finer_in(finer)
     points, triangles = well_shaped(shape, start, nodes, remesher)
     fixed = np.zeros(len(points), bool)
@@ -73,19 +76,21 @@ def base_surface(shape: Shape, remesher: Remesher, start: Surface, nodes: int, f
 
 
 def even_surface(shape: Shape, nodes: int, regions: list[Region]) -> Surface:
-    """An even surface with `nodes` nodes and every region's outline on its edges."""
+    """An even surface with `nodes` nodes and the outline of every region on its edges. Raises StudyError as `even`."""
     start = first_surface(shape)
     with fresh_model():
         return even(shape, nodes, regions, Remesher(*start), start)
 
 
 def even(shape: Shape, nodes: int, regions: list[Region], remesher: Remesher, start: Surface) -> Surface:
-    """An even surface with `nodes` nodes and every region's outline on its edges; remesher: of `start`, a fine surface.
+    """An even surface with `nodes` nodes and the outline of every region on its edges.
 
-    Where edges are too long for a region, the surface is meshed again with edges half as long in the regions."""
+    remesher: of `start`, a fine surface. If edges are too long for a region, the surface is meshed again with edges
+    half as long in the regions. Raises StudyError if none is well shaped, or an outline does not fit.
+    """
     stage(f"a surface of {nodes} nodes")
     for region in regions:
-        region.level(start[0][:1])  # a region that is none is refused here, not inside the mesher
+        region.level(start[0][:1])  # an invalid region is refused here, not inside the mesher
     surface = snap_if_it_fits(shape, *well_shaped(shape, start, nodes, remesher), regions)
     if surface is None:
         remesher.finer_in(regions)
@@ -99,20 +104,23 @@ def area_of(surface: Surface) -> float:
 
 
 def well_shaped(shape: Shape, start: Surface, nodes: int, remesher: Remesher) -> Surface:
-    """An even surface of `nodes` nodes by the remesher of `start`; where it makes none, by MMG from `start`."""
+    """An even surface of `nodes` nodes by the remesher of `start`, or by MMG from `start` if that fails.
+
+    Raises StudyError if both fail.
+    """
     try:
         return surface_with(nodes, area_of(start), remesher.mesh, shape)
     except StudyError:
-        # Not lost: MMG makes one, or gives a sentence of the same kind.
+        # No failure yet: MMG makes one, or raises the same kind of error.
         return surface_with(nodes, area_of(start), EvenRemesher(*start, NEARNESS).mesh, shape)
 
 
 def snap_if_it_fits(shape: Shape, points: np.ndarray, triangles: np.ndarray, regions: list[Region]) -> Surface | None:
-    """The surface with its outlines, or None when its edges are too long for one of the regions."""
+    """The surface with its outlines, or None if its edges are too long for one of the regions."""
     try:
         surface = snap_all(shape, points, triangles, regions)
     except StudyError:
-        # Not lost: the finer surface that follows either fits or gives the same message.
+        # No failure yet: the finer surface that follows fits or raises the same error.
         return None
     return surface if all(is_met(region, *surface) for region in regions) else None
 
@@ -124,7 +132,7 @@ def is_met(region: Region, points: np.ndarray, triangles: np.ndarray) -> bool:
 
 
 def snap_all(shape: Shape, points: np.ndarray, triangles: np.ndarray, regions: list[Region]) -> Surface:
-    """Even out the surface, then give every region its outline."""
+    """The surface after relaxation, with the outline of every region. Raises StudyError if an outline does not fit."""
     fixed = np.zeros(len(points), bool)
     points = relax(shape, points, triangles, None, fixed, fixed)
     return outlined(shape, points, triangles, regions)

@@ -14,14 +14,14 @@ from massspring.sources import ROOT
 from studies.geometry.mesher.progress import BEAT, WAITING
 
 PATIENCE = 20.0
-"""Times as many seconds by the clock, for a process that waits for ever and uses none."""
+"""Limit of the wall time over that of the processor time, for a process that waits for ever and uses none."""
 STOPPED = (-signal.SIGKILL, -getattr(signal, "SIGPROF", signal.SIGKILL)) if hasattr(signal, "SIGKILL") else (1,)
-"""Exit codes of a process whose time was up."""
+"""Exit codes of a process that was stopped at a limit."""
 
 
 @contextmanager
 def pipe_to_here() -> Iterator[int]:
-    """Standard input for a process that is to end with this one: nothing comes, and it closes when this one ends."""
+    """Standard input for a process that has to end with this one: it stays empty and closes when this process ends."""
     reading, writing = os.pipe()
     try:
         yield reading
@@ -31,9 +31,10 @@ def pipe_to_here() -> Iterator[int]:
 
 
 def followed(command: list[str], name: str, limit: float) -> tuple[int, str, str]:
-    """Runs a command to its end and logs each stage that it prints: (exit code, last stage, last error).
+    """Runs a command to its end and logs each stage that it prints; name: of the mesh, for the log.
 
-    The process limits its processor time itself; its wall time is limited to PATIENCE times `limit` [s].
+    Returns exit code, last stage, and last line of standard error. The command limits its processor time; this function
+    limits its wall time to PATIENCE times `limit` [s].
     """
     paths = [str(ROOT), *filter(None, [os.environ.get("PYTHONPATH")])]
     one_thread = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
@@ -52,7 +53,7 @@ def followed(command: list[str], name: str, limit: float) -> tuple[int, str, str
             code = process.wait()
         finally:
             killer.cancel()
-            process.kill()  # when Ctrl-C came: else it has ended
+            process.kill()  # after Ctrl-C; else the process has ended
             process.wait()
             reader.join()
             if process.stdout is not None:
@@ -62,7 +63,7 @@ def followed(command: list[str], name: str, limit: float) -> tuple[int, str, str
 
 
 def read_lines(process: subprocess.Popen[str], lines: queue.Queue[str | None]) -> None:
-    """Every line that a process prints, then None."""
+    """Puts every line that a process prints into the queue, then None."""
     if process.stdout is not None:
         for line in process.stdout:
             lines.put(line.strip())
@@ -70,7 +71,7 @@ def read_lines(process: subprocess.Popen[str], lines: queue.Queue[str | None]) -
 
 
 def last_stage(lines: queue.Queue[str | None], name: str) -> str:
-    """Logs each stage and how long it takes until the last one, which it returns."""
+    """Logs each stage as it comes, and every BEAT seconds how long it has taken; returns the last stage."""
     stage, since = "", time.monotonic()
     while True:
         try:

@@ -1,13 +1,13 @@
-"""Progress of the mesher: a line for each stage, from its process to the process that waits for it."""
+"""Progress of the mesher: its process prints a line for each stage, and the waiting process logs it."""
 
 import logging
 
 WAITING = logging.getLogger("organbench.mesher")
-"""Hears each stage in the process that waits, and every BEAT seconds how long it has taken."""
+"""Logger of the waiting process: each stage, and every BEAT seconds how long it has taken."""
 BEAT = 20.0
-"""Seconds between two signs of life."""
+"""Time [s] between two messages during a stage."""
 
 
 def stage(what: str) -> None:
-    """Reports the next stage in the mesher's process; the process that waits reads it from standard output."""
+    """Reports the next stage from the mesher; the waiting process reads it from standard output."""
     print(what, flush=True)

@@ -1,4 +1,4 @@
-"""Making the mesh of a scan, or its true shape, from a recipe, inside the worker process."""
+"""Makes the mesh of a scan, or its true shape, from a recipe in the worker process."""
 
 import json
 import sys
@@ -29,16 +29,19 @@ from studies.geometry.surface.volume import with_volume
 
 
 def build(recipe: dict[str, Any], arrays: Arrays) -> Arrays:
-    """What a recipe of kind "scan" or "level" asks for. Raises StudyError when it cannot be made."""
+    """The arrays for a recipe of kind "scan" (jobs.PARTS and losses) or "level" (jobs.LEVEL).
+
+    Raises StudyError if they cannot be made.
+    """
     return {"scan": build_scan, "level": build_level}[recipe["kind"]](recipe, arrays)
 
 
 def build_scan(recipe: dict[str, Any], arrays: Arrays) -> Arrays:
-    """The shape that a given surface pictures, with `nodes` nodes, some of them where even ones would cut corners, its
-    volume and the outlines of its regions; and what was lost on the way.
+    """A mesh of the shape that a given surface approximates, with `nodes` surface nodes and the outlines of regions.
 
-    With the grid of its true shape among the arrays the nodes lie on that, for sides that will be curved onto it, and
-    the losses are those of the shape.
+    The mesh has the volume of the surface, and `losses` are its deviations from the file. If the arrays contain the
+    grid of the true shape, the nodes lie on that shape instead, for sides that will be curved onto it, and the losses
+    are those of the shape.
     """
     file = arrays["points"], arrays["triangles"]
     regions = [region_from_dict(data) for data in recipe["regions"].values()]
@@ -53,7 +56,7 @@ def build_scan(recipe: dict[str, Any], arrays: Arrays) -> Arrays:
         shape = shape_of(grid, recipe["name"])
         points, triangles = scan_mesh(shape, start, recipe["nodes"], regions, curved=False)
         volume = signed_volume(*source)
-        # A second on a fine grid: only where the first triangulation, a little too small, leaves a doubt.
+        # This takes a second on a fine grid, so it runs only if the volume of the first triangulation is off.
         if abs(signed_volume(*start) / volume - 1.0) > 0.5 * NOTABLE:
             volume = target_volume(source, enclosed_volume(shape, 1))
         points = with_volume(points, triangles, volume, shape.level, regions)
@@ -63,13 +66,13 @@ def build_scan(recipe: dict[str, Any], arrays: Arrays) -> Arrays:
 
 
 def lost(file: Surface, body: Surface, made: Surface) -> np.ndarray:
-    """The losses of a surface made from that of a file, as JSON; body: with what is enclosed filled."""
+    """The losses of a surface `made` from that of a `file`, as JSON; body: the surface whose volume counts."""
     stage("distances between mesh and file")
     return np.array(json.dumps(fidelity(file, made) | {"volume_file": signed_volume(*body)}))
 
 
 def build_level(recipe: dict[str, Any], arrays: Arrays) -> Arrays:
-    """The grid of the true shape of a scan, the same for all its meshes, and what it lost of the file."""
+    """The grid of the true shape of a scan, the same for all its meshes, and its losses: the arrays of jobs.LEVEL."""
     file = arrays["points"], arrays["triangles"]
     body = solid_body(recipe, file)
     grid = true_grid(*smooth_body(recipe, body, COARSEST * box_of(*body)[0]), recipe["name"])
@@ -78,29 +81,30 @@ def build_level(recipe: dict[str, Any], arrays: Arrays) -> Arrays:
 
 
 def solid_body(recipe: dict[str, Any], file: Surface) -> Surface:
-    """The surface of a file, or with "solid" in the recipe the surface of its filled interior."""
+    """The surface of a file, or with "solid" in the recipe that of the body that it encloses."""
     stage("distances to the surface of the file")
     return file if recipe.get("solid") is None else solidified(*file, recipe["solid"], recipe["name"])
 
 
 def smooth_body(recipe: dict[str, Any], body: Surface, cell: float) -> Surface:
-    """The surface, smoothed if the recipe asks for it, on a grid with cells of at most `cell` [m]."""
+    """The surface, smoothed on a grid with cells of at most `cell` [m] if the recipe says so."""
     smooth = recipe["smooth"]
     return levelled(*body, cell, smooth, recipe["name"]) if smooth > 0 else body
 
 
 NEARNESS = (0.2, 0.1, 0.3)
-"""Largest distances of the remesher from the surface, over the size, tried in turn: which one is best for a thin margin
-is unpredictable."""
+"""Largest distances of the remesher from the surface, over the edge length, tried in turn: it is unpredictable which
+one is best for a thin margin."""
 SPARE = 0.1
-"""Share of the nodes that is put where the evenly spread ones leave the mesh farthest from its shape."""
+"""Share of the nodes that go where the mesh of the evenly spread ones is farthest from its shape."""
 
 
 def scan_mesh(shape: Shape, start: Surface, nodes: int, regions: list[Region], curved: bool) -> Surface:
-    """A surface of `nodes` nodes on f = 0, near to it everywhere, with every region's outline on its edges; curved: its
-    sides will be quadratic, their middles on f = 0.
+    """A surface of `nodes` nodes on f = 0 that follows its shape, with the outline of every region on its edges.
 
-    Raises StudyError when none is well shaped."""
+    start: a fine triangulation of the shape; curved: the sides will be quadratic, with mid-side nodes on f = 0. Raises
+    StudyError if none is well shaped.
+    """
     area, handles = float(triangle_areas(*start).sum()), handles_of(*start)
     best: Fit | None = None
     refusals = []

@@ -1,4 +1,4 @@
-"""A surface filled on either side of planes, the sections meshed in them: the blades of cuts lie on faces."""
+"""Fills a surface on both sides of planes whose sections are meshed, so that the blades of cuts lie on faces."""
 
 from itertools import pairwise, product
 from typing import Any
@@ -25,17 +25,19 @@ from studies.geometry.surface.first_surface import first_surface
 from studies.geometry.surface.sheet import LEAST_PIECE, check_apart, check_sheet
 
 ROUND = 16
-"""Sides of the polygon that stands for the edge of a disc, at least: of fewer it loses more than 3 % of its area."""
+"""Fewest sides of the polygon that represents the edge of a disc: with 16 it has 2.6 % less area than the disc."""
 SHARP = 15.0
-"""Degrees in a triangle of the section below which it keeps the body next to it from being filled."""
+"""Angle of a triangle of the section [degrees] below which it may prevent the fill of the body next to it."""
 FEWEST_CELLS = 30
 """Fewest tetrahedra of a separate piece."""
 Surface = tuple[np.ndarray, np.ndarray]
 
 
 def check_clear(shape: Shape, cuts: list[dict[str, Any]], held: list[Region], nodes: int) -> None:
-    """Raises StudyError for cuts that no mesh of the shape can have with so many surface nodes
-    (studies.geometry.surface.sheet)."""
+    """Raises StudyError for cuts that no mesh of the shape with so many surface nodes can have (surface/sheet.py).
+
+    held: regions whose outlines the cuts must not cross.
+    """
     if not cuts:
         return
     surface, sheets = first_surface(shape), {}
@@ -47,15 +49,18 @@ def check_clear(shape: Shape, cuts: list[dict[str, Any]], held: list[Region], no
 
 
 def plane_of(cut: dict[str, Any]) -> HalfSpace:
-    """Its plane as a region: its outline on a surface is the trace of the cut."""
+    """The plane of a cut as a region, whose outline on a surface is the trace of the cut."""
     plane = region_from_dict(cut["plane"])
-    assert isinstance(plane, HalfSpace)  # a cut has no other
+    assert isinstance(plane, HalfSpace)  # the only kind that a cut has
     return plane
 
 
 def with_front(shape: Shape, surface: Surface, cut: dict[str, Any]) -> Surface:
-    """The surface, whose trace of the plane lies on edges, with the nodes of the trace nearest to a straight front
-    exactly on it. Raises StudyError."""
+    """The surface with the two nodes of the trace that are nearest to a straight front moved exactly onto it.
+
+    The trace of the plane has to lie on edges. Raises StudyError unless the front meets the trace twice, at different
+    nodes.
+    """
     points, triangles = surface
     plane, within = plane_of(cut), _within(cut)
     edges = trace(plane, points, triangles, shape.size, cut["name"])
@@ -83,7 +88,10 @@ def _within(cut: dict[str, Any]) -> Region | None:
 
 
 def trace(plane: HalfSpace, points: np.ndarray, triangles: np.ndarray, size: float, name: str) -> np.ndarray:
-    """Edges (e, 2) of a surface that lie in the plane, between triangles on either side of it. Raises StudyError."""
+    """Edges (e, 2) of a surface that lie in the plane, between triangles on different sides of it.
+
+    size: of the box of the shape [m]; name: of the cut. Raises StudyError if the trace touches itself.
+    """
     on, side = _on(plane, points, size), _side(plane, points, triangles, size)
     half = triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
     keys, inverse = np.unique(np.sort(half, axis=1), axis=0, return_inverse=True)
@@ -99,7 +107,7 @@ def _on(plane: HalfSpace, points: np.ndarray, size: float) -> np.ndarray:
 
 
 def _side(plane: HalfSpace, points: np.ndarray, triangles: np.ndarray, size: float) -> np.ndarray:
-    """−1 behind the plane and 1 in front of it, of each triangle; of one in the plane, that of the body next to it."""
+    """Side of each triangle (t,): −1 behind the plane, 1 in front; for a triangle in the plane that of the body."""
     flat = _on(plane, points, size)[triangles].all(axis=1)
     outward = triangle_normals(points, triangles) @ np.asarray(plane.normal, float)
     return np.where(np.where(flat, outward < 0, plane.level(points[triangles].mean(axis=1)) > 0), 1, -1)
@@ -108,8 +116,11 @@ def _side(plane: HalfSpace, points: np.ndarray, triangles: np.ndarray, size: flo
 def fill_cut(
     shape: Shape, surface: Surface, cuts: list[dict[str, Any]]
 ) -> tuple[np.ndarray, np.ndarray, list[np.ndarray]]:
-    """All points [m], the surface's first, tetrahedra inside, and the faces of each blade (f, 3), seen anticlockwise
-    from in front of its plane. Raises StudyError."""
+    """Fills a surface on both sides of each cut.
+
+    Returns all points (n, 3) [m], those of the surface first, tetrahedra (k, 4), and the faces (f, 3) of each blade,
+    anticlockwise seen from in front of its plane. Raises StudyError for a piece that is too small or cannot be filled.
+    """
     points, triangles = surface
     planes, sections, blades = [plane_of(cut) for cut in cuts], list[np.ndarray](), list[np.ndarray]()
     for plane, cut in zip(planes, cuts, strict=True):
@@ -118,7 +129,7 @@ def fill_cut(
         points = np.concatenate([points, new])
         sections.append(faces)
         blades.append(faces[blade])
-    # Every triangle bounds the body on its side of each plane; those of a section bound it on both sides of their
+    # Every triangle bounds the body on its side of each plane; a triangle of a section bounds it on both sides of its
     # plane.
     walls, sides = [triangles], [np.stack([_side(plane, points, triangles, shape.size) for plane in planes], axis=1)]
     for k, faces in enumerate(sections):
@@ -154,10 +165,12 @@ def fill_cut(
 def cut_wall(
     shape: Shape, points: np.ndarray, triangles: np.ndarray, tetrahedra: np.ndarray, cut: dict[str, Any]
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The points (n (layers + 1), 3) [m] of a layered wall behind its outer surface, in the order of
-    studies.geometry.mesh.wall_layers, those behind the trace moved into the plane; and the faces of the blade (f, 3),
-    the sides of prisms between them, seen anticlockwise from in front of the plane. Raises StudyError where that
-    flattens an element."""
+    """Cuts a layered wall: its points (n (layers + 1), 3) [m] and the faces (f, 3) of the blade.
+
+    The points have the order of studies.geometry.mesh.wall_layers; those below the trace are moved into the plane. The
+    faces are sides of prisms, anticlockwise seen from in front of the plane. triangles (t, 3): of the outer surface.
+    Raises StudyError if the move flattens an element.
+    """
     plane, within = plane_of(cut), _within(cut)
     count = int(triangles.max()) + 1
     edges = trace(plane, points[:count], triangles, shape.size, cut["name"])
@@ -183,14 +196,13 @@ def cut_wall(
     keys = columns[:, 0] * count + columns[:, 2]
     blade = ((columns[:, 1] == columns[:, 0]) | (columns[:, 1] == columns[:, 2])) & (columns[:, 0] < columns[:, 2])
     blade &= np.isin(keys, edges.min(axis=1) * count + edges.max(axis=1))
-    # Each face is seen from both of its elements; the one behind the plane sees it from in front.
+    # Both elements at a face contain it; that of the element behind the plane is anticlockwise seen from in front.
     blade &= triangle_normals(points, faces) @ np.asarray(plane.normal, float) > 0
     return points, faces[blade]
 
 
 def why_not_filled(points: np.ndarray, faces: np.ndarray, error: StudyError) -> str:
-    """What is wrong with a cut, one of whose sides could not be filled: a front next to the outline of the section
-    leaves `faces` (f, 3) too sharp for that."""
+    """Why a side of a cut could not be filled: too sharp an angle in its `faces` (f, 3), else the `error`."""
     a, b, c = points[faces].transpose(1, 0, 2)
     sides = np.stack([b - a, c - b, a - c])
     sides /= np.linalg.norm(sides, axis=2)[:, :, None]
@@ -214,8 +226,12 @@ def _pieces(triangles: np.ndarray, count: int) -> list[np.ndarray]:
 def section(
     plane: HalfSpace, points: np.ndarray, edges: np.ndarray, within: Region | None, name: str
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """New points (n, 3) [m] in the plane, the triangles of its section by all points, seen from in front, and which of
-    them are the blade's. Raises StudyError."""
+    """Meshes the section of a plane, whose trace is `edges` (e, 2).
+
+    Returns new points (n, 3) [m] in the plane, triangles (t, 3) of all points, old ones first, anticlockwise seen from
+    in front, and which of them belong to the blade (t,). Raises StudyError for a section or blade without faces, and
+    for a front or disc that does not fit.
+    """
     if not len(edges):
         raise StudyError(f"{name}: no edge of the surface lies in its plane, so small is what it cuts; use more nodes")
     normal = np.asarray(plane.normal, float) / np.linalg.norm(plane.normal)
@@ -249,7 +265,7 @@ def section(
 
 
 def loops(edges: np.ndarray) -> list[np.ndarray]:
-    """The closed loops of edges (e, 2), each node of which has two, as nodes in turn."""
+    """The closed loops of edges (e, 2), as the nodes of each in order; every node must have two edges."""
     neighbours: dict[int, list[int]] = {}
     for a, b in edges.tolist():
         neighbours.setdefault(a, []).append(b)
@@ -266,14 +282,14 @@ def loops(edges: np.ndarray) -> list[np.ndarray]:
 
 
 def _straight(start: np.ndarray, end: np.ndarray, step: float) -> np.ndarray:
-    """Points about `step` [m] apart between two others, (f, 3) [m]."""
+    """Points (f, 3) [m] about `step` [m] apart between `start` and `end`, without these."""
     count = max(2, round(float(np.linalg.norm(end - start)) / step))
     share = np.arange(1, count)[:, None] / count
     return (1 - share) * start + share * end
 
 
 def _rim(plane: HalfSpace, within: BallRegion, normal: np.ndarray, axes: np.ndarray, step: float) -> np.ndarray:
-    """Points on the edge of a disc, (f, 3) [m]."""
+    """Points (f, 3) [m], about `step` [m] apart, on the circle in which a ball meets the plane."""
     away = float(plane.level(np.array([within.center]))[0])
     radius = np.sqrt(within.radius**2 - away**2)
     count = max(ROUND, round(2 * np.pi * radius / step))
@@ -282,9 +298,10 @@ def _rim(plane: HalfSpace, within: BallRegion, normal: np.ndarray, axes: np.ndar
 
 
 def meshed(flat: np.ndarray, outlines: list[np.ndarray], chain: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Points (m, 2), those given first, and triangles of the plane inside the outlines, loops of points.
+    """Meshes a plane region: points (m, 2), the given points `flat` first, and triangles (t, 3), anticlockwise.
 
-    The chain of points (c,) lies on edges: from outline to outline, or a ring whose first point is also its last.
+    outlines: loops of point numbers that bound the region; chain (c,): point numbers whose connections become edges,
+    from outline to outline, or a ring whose first point is also its last.
     """
     size, add = float(np.ptp(flat)), gmsh.model.geo
     closed = len(chain) > 0 and chain[0] == chain[-1]

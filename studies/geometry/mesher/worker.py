@@ -1,7 +1,7 @@
-"""Process that meshes one recipe: `python -m studies.geometry.mesher.organ_recipe JOB.npz OUT.npz`, or scan_recipe.
+"""Process that meshes one recipe: `python -m studies.geometry.mesher.organ_recipe JOB.npz OUT.npz SECONDS`.
 
-gmsh can hang without a message or crash; a separate process protects the caller. Scans use a separate module because
-their compiled distances take half a second to import.
+gmsh can hang without a message or crash; a separate process protects the caller. Scans use the module scan_recipe,
+because their compiled distances take half a second to import.
 """
 
 import json
@@ -20,17 +20,17 @@ Arrays = dict[str, np.ndarray]
 
 
 LEAST = 1e-3
-"""Seconds that a clock needs to be started with."""
+"""Smallest value [s] with which the timer starts."""
 
 
 def work(build: Callable[[dict[str, Any], Arrays], Arrays], job_path: str, out_path: str, limit: str) -> int:
-    """Reads the job, writes the mesh of `build` or the sentence of its StudyError; the exit code, 0 or 2.
+    """Reads the job and writes the arrays of `build`, or the message of its StudyError. Returns the exit code, 0 or 2.
 
-    Standard input is a pipe that the caller holds open; the process ends when it closes. It also ends after `limit`
-    seconds of processor time, even inside a library.
+    Standard input is a pipe that the caller keeps open; the process ends when it closes. The process also ends after
+    `limit` seconds of processor time, even inside a library.
     """
     end_after(lambda: os.read(0, 1))
-    if hasattr(signal, "setitimer"):  # not on Windows, where the caller's clock alone decides
+    if hasattr(signal, "setitimer"):  # Windows has none; there only the clock of the caller limits the time
         signal.setitimer(signal.ITIMER_PROF, max(float(limit) - time.process_time(), LEAST))
     with np.load(job_path, allow_pickle=False) as job:
         arrays = {key: job[key] for key in job.files if key != "recipe"}

@@ -1,4 +1,4 @@
-"""The organs, one file each: a level function, its box, its attachments. Adding one: a file and a line in SHAPES."""
+"""The organs, one file each: level function, box and attachments. To add one, write a file and a line in SHAPES."""
 
 from collections.abc import Callable
 

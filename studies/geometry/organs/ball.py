@@ -1,4 +1,4 @@
-"""Ball: the shape with closed forms."""
+"""Ball: the shape for which closed-form solutions exist."""
 
 import numpy as np
 
@@ -9,7 +9,7 @@ from studies.geometry.shape.levelset import Shape
 def ball_shape(radius: float = 0.05, wall: float | None = None) -> Shape:
     """Ball of the given radius [m] around the origin, hollow with a wall [m].
 
-    Raises StudyError unless 0 < radius < inf and 0 < wall < radius.
+    Raises StudyError unless 0 < radius < inf and, for a hollow ball, 0 < wall < radius.
     """
     if not 0 < radius < np.inf:
         raise StudyError(f"a ball of radius {radius} m cannot be meshed; give a radius above 0")
@@ -27,5 +27,5 @@ def ball_shape(radius: float = 0.05, wall: float | None = None) -> Shape:
 
 
 def project_ball(points: np.ndarray, radius: float = 0.05) -> np.ndarray:
-    """Nearest points, shape (n, 3), on the sphere of the given radius [m] around the origin."""
+    """Nearest points to points (n, 3) [m] on the sphere of the given radius [m] around the origin, shape (n, 3) [m]."""
     return points * (radius / np.linalg.norm(points, axis=1, keepdims=True))

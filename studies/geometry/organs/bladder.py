@@ -1,4 +1,4 @@
-"""Urinary bladder, hollow: an egg lying forward, its dome flattened, its neck below. Axes as the liver's."""
+"""Urinary bladder, hollow: an egg that points forward, with a flattened dome and the neck below. Axes: see liver.py."""
 
 import numpy as np
 
@@ -17,8 +17,9 @@ def bladder_shape(
 ) -> Shape:
     """A well filled adult bladder [mm].
 
-    neck: its outer radius. The wall has up to 3 mm full, 5 mm empty (Jequier, Am. J. Roentgenol. 149 (1987) 563).
-    Raises StudyError for a length that is none and a wall that fills the neck.
+    width, depth, height: of the egg without apex and neck; neck: its outer radius. The wall is up to 3 mm thick when
+    the bladder is full and 5 mm when it is empty (Jequier, Am. J. Roentgenol. 149 (1987) 563). Raises StudyError
+    unless every length is finite and above 0, and for a wall over 0.75 of the neck.
     """
     check_lengths("bladder", width=width, depth=depth, height=height, neck=neck, wall=wall)
     check_wall("bladder", wall, neck)

@@ -1,4 +1,4 @@
-"""Left kidney: a bean on end, its hilum towards the spine. Axes as the liver's."""
+"""Left kidney: an upright bean with its hilum towards the spine. Axes: see liver.py."""
 
 import numpy as np
 
@@ -15,7 +15,8 @@ VOLUME = Literature(
 def kidney_shape(length: float = 110.0, width: float = 60.0, thickness: float = 47.0, sinus: float = 20.0) -> Shape:
     """An adult's kidney [mm]: 10.6 ± 0.6 cm long (Lee 1996, as for the volume), 6 wide, 4-5 thick.
 
-    sinus: depth of the hollow behind the lips of the hilum. Raises StudyError for a length that is none.
+    sinus: depth of the hollow behind the lips of the hilum. Raises StudyError unless every length is finite and above
+    0.
     """
     check_lengths("kidney", length=length, width=width, thickness=thickness, sinus=sinus)
     w, half = 0.5 * width, 0.5 * length
@@ -24,7 +25,7 @@ def kidney_shape(length: float = 110.0, width: float = 60.0, thickness: float = 
     hilum, slit = (-0.88 * w, -0.06 * w, 0), (sinus, 0.18 * thickness, 0.18 * length)
 
     def level(x: np.ndarray) -> np.ndarray:
-        # Flattened from front to back, and hollowed where vessels and ureter come in, between two lips.
+        # Flattened from front to back, and hollowed between two lips where vessels and ureter enter.
         outer = canal(x * (1.0, width / thickness, 1.0), bean)
         return smooth_max(outer, -ellipsoid(x, hilum, slit), 11)
 

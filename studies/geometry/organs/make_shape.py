@@ -12,7 +12,10 @@ from studies.geometry.shape.levelset import Shape
 
 
 def make_shape(name: str, parameters: Mapping[str, Any]) -> Shape:
-    """The shape `name` of SHAPES with some parameters; raises StudyError for an unknown name, parameter or value."""
+    """The shape `name` of SHAPES; `parameters` replace defaults of its function.
+
+    Raises StudyError for an unknown name or parameter, and for a value that is no number or that the shape refuses.
+    """
     make = lookup(name, SHAPES, "organ")
     signature = inspect.signature(make).parameters
     for parameter, value in parameters.items():

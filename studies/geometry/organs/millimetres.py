@@ -1,4 +1,4 @@
-"""From an anatomical description in millimetres to a shape in SI units: the one place where they are converted."""
+"""Converts anatomical descriptions in millimetres to shapes in SI units; no other module converts them."""
 
 from collections.abc import Callable
 
@@ -12,7 +12,7 @@ from studies.geometry.shape.regions import Vector
 MM = 1e-3
 """Metres in a millimetre."""
 MARGIN = 12.0
-"""Room between an organ and the walls of its box [mm]: two cells of the coarsest grid."""
+"""Room between an organ and the walls of its box [mm]: more than two cells of the coarsest grid, which has 5 mm."""
 
 
 def check_lengths(organ: str, **lengths: float) -> None:
@@ -23,8 +23,8 @@ def check_lengths(organ: str, **lengths: float) -> None:
 
 
 def check_wall(organ: str, wall: float, narrowest: float) -> None:
-    """Raise StudyError unless the wall [mm] leaves a lumen inside the narrowest radius [mm] of the organ."""
-    # The lumen of the narrowest tube keeps a quarter of its radius: less cannot be meshed.
+    """Raise StudyError for a wall [mm] over 0.75 of the narrowest outer radius [mm] of the organ."""
+    # A lumen narrower than a quarter of that radius cannot be meshed.
     if not wall <= 0.75 * narrowest:
         raise StudyError(
             f"{organ}: a wall of {wall:g} mm leaves no lumen where the radius is {narrowest:g} mm; "
@@ -33,7 +33,7 @@ def check_wall(organ: str, wall: float, narrowest: float) -> None:
 
 
 def si(level: Level) -> Level:
-    """A level function of metres [m] from one of millimetres [mm]."""
+    """Converts a level function in [mm] of points in [mm] to one in [m] of points in [m]."""
     return lambda points: level(np.asarray(points, float) / MM) * MM
 
 
@@ -44,9 +44,9 @@ def metres(x: float, y: float, z: float) -> Vector:
 
 
 def box_of(*tubes: list[Sphere]) -> tuple[Vector, Vector]:
-    """Corners [m] of a box around canal surfaces with the given control spheres [mm], with MARGIN to spare.
+    """Low and high corner [m] of a box that leaves MARGIN around canal surfaces with these control spheres [mm].
 
-    A Bezier curve stays in the hull of its control points.
+    A Bezier curve stays in the convex hull of its control points.
     """
     rows = np.array([sphere for tube in tubes for sphere in tube])
     low = (rows[:, :3] - rows[:, 3:]).min(axis=0) - MARGIN
@@ -55,13 +55,14 @@ def box_of(*tubes: list[Sphere]) -> tuple[Vector, Vector]:
 
 
 def touch(level: Callable[[np.ndarray], np.ndarray], start: Vector, direction: Vector) -> PalpationPoint:
-    """Where a ray from `start` [mm], outside, along `direction` first meets level = 0 [mm], and the normal there.
+    """The point [m] where a ray from `start` [mm] along `direction` first meets level = 0, and the unit normal there.
 
-    Raises StudyError when it does not within 300 mm.
+    level: points (n, 3) [mm] -> (n,) [mm]. Raises StudyError if `start` lies inside, or if the ray meets no surface
+    within 300 mm.
     """
     along = np.asarray(direction, float) / np.linalg.norm(direction)
     low, high = 0.0, 300.0
-    # Each round narrows the interval a hundredfold: from 3 mm to less than numbers near 300 resolve.
+    # Each round divides the interval by 100. After eight it is below the spacing of floating-point numbers near 300.
     for _ in range(8):
         far = np.linspace(low, high, 101)
         inside = np.flatnonzero(level(np.asarray(start, float) + far[:, None] * along) < 0)
@@ -74,9 +75,9 @@ def touch(level: Callable[[np.ndarray], np.ndarray], start: Vector, direction: V
 
 
 def probe_near(shape: Shape, seed: Vector) -> PalpationPoint:
-    """The probe at the surface point to which `seed` [m] is brought along the gradient.
+    """The probe at the surface point [m] that the projection of `seed` [m] along the gradient reaches.
 
-    Raises StudyError when it lies too far off.
+    Raises StudyError if `seed` lies too far from the surface.
     """
     point = project(shape, np.array([seed]))
     normal = normals(shape, point)[0]
@@ -84,6 +85,6 @@ def probe_near(shape: Shape, seed: Vector) -> PalpationPoint:
 
 
 def unit(x: float, y: float, z: float) -> Vector:
-    """The vector with length 1."""
+    """The vector scaled to length 1."""
     length = float(np.sqrt(x * x + y * y + z * z))
     return float(x) / length, float(y) / length, float(z) / length

@@ -1,5 +1,5 @@
-"""Spleen: a curved wedge under the left ribs, hollowed by stomach and kidney. Axes: x outwards to the ribs, y back
-along the tenth rib, z to the superior border."""
+"""Spleen: a curved wedge under the left ribs, which stomach and kidney hollow. Axes: x outwards to the ribs, y to the
+back along the tenth rib, z to the superior border."""
 
 import numpy as np
 
@@ -14,7 +14,8 @@ VOLUME = Literature(200.0, "Prassopoulos et al., Eur. Radiol. 7 (1997) 246: 215 
 def spleen_shape(length: float = 126.0, width: float = 82.0, thickness: float = 50.0, notch: float = 10.0) -> Shape:
     """An adult's spleen [mm]: 10-12 cm long, 7-9 wide, 4.6 thick (Caglar et al., Folia Morphol. 73, 2014).
 
-    notch: depth of those in its superior border. Raises StudyError for a length that is none.
+    length, width: of the wedge before the hollows, which leave 119 by 76 mm by default; notch: depth of the notches in
+    the superior border. Raises StudyError unless every length is finite and above 0.
     """
     check_lengths("spleen", length=length, width=width, thickness=thickness, notch=notch)
     u, v, t = 0.5 * length, 0.5 * width, thickness
@@ -24,7 +25,7 @@ def spleen_shape(length: float = 126.0, width: float = 82.0, thickness: float = 
         stomach = ellipsoid(x, (-1.25 * t, -0.5 * u, 0.35 * v), (t, 1.2 * u, 1.2 * v))
         kidney = ellipsoid(x, (-1.25 * t, 0.5 * u, -0.75 * v), (0.9 * t, u, v))
         body = smooth_max(outer, -smooth_min(stomach, kidney, 8), 10)
-        # The superior border is notched towards its front end: what is left of the lobes of the embryo.
+        # The superior border has notches towards its front end, remains of the lobes of the embryo.
         for y in (-0.55, -0.15):
             body = body + groove(x, (0.3 * t, y * u, 1.1 * v), (-t, y * u, 0.75 * v), 6, notch)
         return body

@@ -1,4 +1,4 @@
-"""Stomach: a J of two tubes, hollow. Axes as the liver's: x to the patient's left, y to the back, z to the head."""
+"""Stomach: a J of two tubes, hollow. Axes: x to the patient's left, y to the back, z to the head."""
 
 import numpy as np
 
@@ -20,9 +20,10 @@ def stomach_shape(
 ) -> Shape:
     """A distended adult stomach: fundus above the cardia, body, incisura, antrum rising to the pylorus [mm].
 
-    height, width: of the whole, as seen from the front; fundus, body, antrum: outer radii. The wall has 4.9 ± 1.6 mm
-    (Suk et al., J. Clin. Ultrasound 36 (2008) 462); the ends at cardia and pylorus are tubes 35 mm wide.
-    Raises StudyError for a length that is none and a wall that fills the pylorus.
+    height, width: of the whole stomach, seen from the front; fundus, body, antrum: outer radii. A real wall is
+    4.9 ± 1.6 mm thick (Suk et al., J. Clin. Ultrasound 36 (2008) 462). Cardia and pylorus end in tubes of the outer
+    radius 0.68 antrum. Raises StudyError unless every length is finite and above 0, and for a wall over 0.75 of that
+    radius.
     """
     check_lengths("stomach", height=height, width=width, fundus=fundus, body=body, antrum=antrum, wall=wall)
     check_wall("stomach", wall, 0.68 * antrum)
@@ -35,7 +36,7 @@ def stomach_shape(
     sac, exit_, gullet = closed([*upper, *lower]), closed([*sinus, *outlet]), closed([(*c, 0.68 * a) for c in cardia])
 
     def level(x: np.ndarray) -> np.ndarray:
-        # Where body and antrum meet on the lesser curvature, the blend leaves the incisura.
+        # The incisura remains where body and antrum meet on the lesser curvature.
         return local_min(local_min(canal(x, sac), canal(x, exit_), 16), canal(x, gullet), 20)
 
     low, high = box_of(sac, exit_, gullet)

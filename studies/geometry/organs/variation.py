@@ -10,17 +10,17 @@ from studies.base.lookup import lookup
 from studies.geometry.organs import SHAPES
 
 COMMON = 0.7
-"""Share of the spread that all lengths of one organ have in common: a long kidney is a wide one."""
+"""Share of the spread that all lengths of one organ have in common: a long kidney is also wide."""
 WIDEST = 0.3
-"""Largest spread: beyond it parts of an organ no longer fit to each other."""
+"""Largest spread: beyond it the parts of an organ no longer fit together."""
 
 
 def vary(name: str, seed: int, spread: float = 0.2) -> dict[str, float]:
-    """Parameters for `SHAPES[name]`, each within a factor 1 - spread to 1 + spread of its default; JSON-able.
+    """Random parameters for `SHAPES[name]`, each within 1 - spread to 1 + spread times its default; JSON-able.
 
-    All lengths share one random factor and each has a smaller separate one; the wall varies independently, because
-    filling thins it. The same seed gives the same organ. Raises StudyError for an unknown organ, a seed that is no
-    whole number from 0 on, or a spread outside 0 to WIDEST.
+    All lengths share one random factor, and each has a smaller one that is independent. The wall varies independently
+    of them, because filling thins it. The same seed gives the same organ. Raises StudyError for an unknown organ, a
+    seed that is not a whole number >= 0, and a spread outside 0 to WIDEST.
     """
     shape = lookup(name, SHAPES, "organ")
     if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
@@ -31,7 +31,7 @@ def vary(name: str, seed: int, spread: float = 0.2) -> dict[str, float]:
     size = rng.uniform(-1.0, 1.0)
     values = {}
     for parameter in inspect.signature(shape).parameters.values():
-        if parameter.default is None:  # a ball is solid
+        if parameter.default is None:  # the wall of a ball, which stays solid
             continue
         own = rng.uniform(-1.0, 1.0)
         share = own if parameter.name == "wall" else COMMON * size + (1.0 - COMMON) * own

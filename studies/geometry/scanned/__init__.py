@@ -1,1 +1,1 @@
-"""A surface from a file as a level function."""
+"""The surface of a file as a level function."""

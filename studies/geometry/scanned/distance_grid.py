@@ -1,5 +1,5 @@
-"""The signed distance to a closed triangulation on a regular grid, with which a scan is smoothed, closed and
-remeshed."""
+"""The signed distance to a closed triangulation on a regular grid: the basis for smoothing, closing and remeshing a
+scan."""
 
 import numpy as np
 from scipy.ndimage import distance_transform_edt
@@ -9,14 +9,14 @@ from studies.geometry.scanned.level_grid import DistanceGrid
 from studies.geometry.surface.triangle_distance import band_distance_into, far_distance_into
 
 BAND = 4.0
-"""Cells on either side of the surface where the distance is exact; farther out it is so to a few per cent of a cell."""
+"""Distance in cells up to which the grid is exact; farther out it is accurate to a few per cent of a cell."""
 
 
 def distance_grid(points: np.ndarray, triangles: np.ndarray, cell: float, margin: float) -> DistanceGrid:
-    """Signed distance to the surface points (n, 3) [m], triangles (t, 3), with `margin` [m] of room around it.
+    """Signed distance [m], negative inside, to a surface of points (n, 3) [m] and triangles (t, 3).
 
-    Inside is where the surface winds round a point a positive number of times, so parts that overlap or cross
-    themselves count once. The triangles must be outward and without border.
+    cell: edge of the grid cells [m]; margin: room around the surface [m]. A point lies inside if its winding number is
+    positive, so parts that overlap or cross themselves count once. The triangles must be outward and without border.
     """
     used = points[np.unique(triangles)]
     low, high = used.min(axis=0) - margin, used.max(axis=0) + margin
@@ -28,23 +28,25 @@ def distance_grid(points: np.ndarray, triangles: np.ndarray, cell: float, margin
 
 
 def squared_distance(corners: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
-    """Squared distance of grid points to triangles, corners (t, 3, 3), in cells: exact within BAND.
+    """Squared distance [cells^2] of the points of a grid of `shape` to triangles with corners (t, 3, 3) [cells].
 
-    Farther out it is that to the triangle nearest to the nearest grid point next to the surface.
+    It is exact up to a distance of BAND. Farther out it is the distance to one triangle: the nearest triangle of the
+    nearest grid point within one cell of the surface.
     """
     squared, owner, scratch = np.full(shape, np.inf), np.zeros(shape, np.uint32), np.empty((4, 3))
     band_distance_into(corners, BAND, scratch, squared, owner)
-    # The nearest grid points are within half the diagonal of a cell from the surface.
+    # One cell is enough: every point of the surface is within half the diagonal of a cell, 0.87, of a grid point.
     nearest = distance_transform_edt(squared > 1.0, return_distances=False, return_indices=True)
     far_distance_into(corners, BAND, owner[tuple(np.asarray(nearest))], scratch, squared)
     return squared
 
 
 def winding_number(points: np.ndarray, triangles: np.ndarray, axes: list[np.ndarray]) -> np.ndarray:
-    """How often the surface winds round each grid point, shape (a, b, c): signed crossings of the ray downwards.
+    """Winding number of the surface around each grid point, shape (a, b, c): signed crossings of the ray upwards.
 
-    Rays are moved off the grid by a tiny irrational fraction of a cell, so that none meets an edge; each edge is
-    evaluated from its lower to its higher node, so that its two triangles agree about every ray.
+    axes: coordinates [m] of the grid along x, y, z. Rays are moved off the grid by a tiny irrational fraction of a
+    cell, so that none meets an edge. Each edge is evaluated from its lower to its higher node, so that its two
+    triangles agree about every ray.
     """
     x, y, z = axes
     shift = 1e-7 * (x[1] - x[0]) * np.array([np.sqrt(2.0), np.sqrt(3.0)])
@@ -58,14 +60,17 @@ def winding_number(points: np.ndarray, triangles: np.ndarray, axes: list[np.ndar
     total = np.where(hit, sum(weights), 1.0)
     height = sum(w * points[corners[:, k], 2] for k, w in enumerate(weights)) / total
     counts = np.zeros((len(x), len(y), len(z) + 1))
-    # A ray upwards leaves through a face that looks up: all grid points below it are one deeper inside.
+    # A ray upwards leaves the body through a face that looks up, so the face adds 1 for all grid points below it.
     level = np.searchsorted(z, height[hit])
     np.add.at(counts, (i[hit], j[hit], level), side[hit])
     return counts[:, :, ::-1].cumsum(axis=2)[:, :, ::-1][:, :, 1:]
 
 
 def columns_under(corners: np.ndarray, shape: tuple[int, int]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """For all columns of the grid in the box of each triangle, corners (t, 3, 2) in cells: triangle, i, j."""
+    """Triangle and column i, j of all columns of the grid in the box of each triangle, each (m,).
+
+    corners: of the triangles in the xy plane, shape (t, 3, 2) [cells]; shape: number of columns along x and y.
+    """
     first = np.clip(np.ceil(corners.min(axis=1)), 0, None).astype(int)
     last = np.clip(np.floor(corners.max(axis=1)), None, np.array(shape) - 1).astype(int)
     size = np.maximum(last - first + 1, 0)
@@ -77,7 +82,10 @@ def columns_under(corners: np.ndarray, shape: tuple[int, int]) -> tuple[np.ndarr
 
 
 def edge_function(flat: np.ndarray, start: np.ndarray, end: np.ndarray, ray: np.ndarray) -> np.ndarray:
-    """Twice the signed area of (start, end, ray) in the plane, shape (n,): exactly opposite for the reverse edge."""
+    """Twice the signed area of (start, end, ray) in the plane, shape (n,); the reverse edge has exactly its negative.
+
+    flat: points (m, 2); start, end: node numbers (n,); ray: points (n, 2).
+    """
     turned = start > end
     a, b = flat[np.where(turned, end, start)], flat[np.where(turned, start, end)]
     area = (b[:, 0] - a[:, 0]) * (ray[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (ray[:, 0] - a[:, 0])

@@ -1,4 +1,4 @@
-"""What a mesh of a scan lost: distances to the file and back, volume, thin parts."""
+"""How a mesh of a scan deviates from the file: distances in both directions, volume, handles."""
 
 from typing import Any
 
@@ -9,18 +9,20 @@ from studies.geometry.surface.distance import distance_to_surface
 from studies.geometry.surface.node_count import handles_of
 
 MOST = 40_000
-"""Places of a surface that are measured: more are thinned out evenly."""
+"""Most points of a surface that are measured; of more, every k-th is taken."""
 NOTABLE = 0.02
-"""Largest distance over the diagonal, and change of the volume, beyond which the user is warned."""
+"""The user is warned of a distance beyond this share of the diagonal or beyond the mean edge, whichever is smaller, and
+of a relative change of the volume beyond this share."""
 
 Surface = tuple[np.ndarray, np.ndarray]
 
 
 def fidelity(file: Surface, mesh: Surface) -> dict[str, Any]:
-    """How near a mesh is to the surface of a file, both as points (n, 3) [m] and closed triangles (t, 3); JSON-able.
+    """Deviations of a mesh from the surface of a file, each as points (n, 3) [m] and closed triangles (t, 3).
 
-    file_to_mesh, mesh_to_file: mean, p95, max [m] and where the largest is [m]; volume_file, volume_mesh [m^3];
-    diagonal, edge: of the file's box and the mean one of the mesh [m]; handles: of the mesh.
+    Returns a JSON-able dict. file_to_mesh, mesh_to_file: mean, p95 and max of the distance [m], and where the largest
+    is [m]; volume_file, volume_mesh [m^3]; diagonal: of the box of the file [m]; edge: mean edge of the mesh [m];
+    handles: number of handles of the mesh.
     """
     edges = unique_edges(mesh[1])
     return {
@@ -35,9 +37,9 @@ def fidelity(file: Surface, mesh: Surface) -> dict[str, Any]:
 
 
 def spread(one: Surface, other: Surface) -> dict[str, Any]:
-    """Distances [m] from a surface to another, seen from its nodes, the middles of its edges and its triangles.
+    """Mean, p95 and max [m] of the distance of `one` surface from the `other`, and the point [m] of the largest.
 
-    Mean and 95th percentile are weighted by area.
+    Measured at the nodes, edge midpoints and centroids of `one`; mean and 95th percentile are weighted by area.
     """
     places, weights = samples(*one)
     away = distance_to_surface(places, *other)
@@ -53,7 +55,7 @@ def spread(one: Surface, other: Surface) -> dict[str, Any]:
 
 
 def samples(points: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Places (m, 3) [m] on a surface and the area [m^2] that each stands for: nodes, middles of edges, centroids."""
+    """Nodes, edge midpoints and centroids (m, 3) [m] of a surface and the area [m^2] that each represents, (m,)."""
     corners, areas = points[triangles], triangle_areas(points, triangles)
     middles = 0.5 * (corners + np.roll(corners, -1, axis=1))
     places = np.concatenate([corners.mean(axis=1), middles.reshape(-1, 3), points[np.unique(triangles)]])
@@ -64,7 +66,7 @@ def samples(points: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.n
 
 
 def warnings_of(lost: dict[str, Any]) -> list[str]:
-    """Warnings for the user; none if all deviations are small."""
+    """Sentences that warn the user of deviations, as `fidelity` returns them; empty if all are small."""
     sentences = []
     for key, what in (
         ("file_to_mesh", "this part of the file is missing from the mesh"),

@@ -1,4 +1,4 @@
-"""Signed distances on a regular grid as a shape; a separate, compiled module computes them."""
+"""Signed distances on a regular grid as a shape. distance_grid.py, which loads compiled code, computes them."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -11,11 +11,11 @@ from studies.geometry.shape.levelset import Shape
 
 @dataclass(frozen=True, eq=False)
 class DistanceGrid:
-    """Signed distances, negative inside.
+    """Signed distances on a regular grid, negative inside.
 
     low: first corner [m], shape (3,)
     cell: edge of the cells [m]
-    values: distance [m], shape (a, b, c)
+    values: distance [m] at the grid points, shape (a, b, c)
     """
 
     low: np.ndarray
@@ -29,12 +29,13 @@ class DistanceGrid:
 
     @property
     def volume(self) -> float:
-        """Volume [m^3] where the distance is negative, cells at the surface counted by their share."""
+        """Volume [m^3] where the distance is negative; cells at the surface count with their share."""
         # A plane at signed distance d from the centre of a cell cuts off about 1/2 - d/cell of it.
         return float(np.clip(0.5 - self.values / self.cell, 0.0, 1.0).sum() * self.cell**3)
 
     def level(self):
-        """f(points (n, 3) [m]) -> (n,) [m]: the cubic spline through the grid, twice differentiable."""
+        """Function points (n, 3) [m] -> (n,) [m]: the cubic spline through the grid, twice continuously
+        differentiable."""
         coefficients = spline_filter(self.values, order=3, mode="mirror")
 
         def f(points: np.ndarray) -> np.ndarray:
@@ -45,11 +46,11 @@ class DistanceGrid:
 
 
 def grid_from(arrays: Mapping[str, np.ndarray]) -> DistanceGrid:
-    """The grid whose fields are stored as arrays."""
+    """The grid from arrays with the names of its fields."""
     return DistanceGrid(arrays["low"], float(arrays["cell"]), arrays["values"])
 
 
 def shape_of(grid: DistanceGrid, name: str, wall: float | None = None) -> Shape:
-    """The body where the distances of a grid are negative; wall: thickness [m] of that of a hollow one."""
+    """The shape whose inside has negative distances; wall: thickness [m] of the wall of a hollow shape."""
     low, high = tuple(map(float, grid.low)), tuple(map(float, grid.high))
     return Shape(name, grid.level(), low, high, grid.cell, wall=wall)  # pyright: ignore[reportArgumentType]

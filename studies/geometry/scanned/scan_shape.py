@@ -1,4 +1,4 @@
-"""A scan as a level set: from there the same way to a mesh as a synthetic organ's."""
+"""A scan as a level set, which is then meshed like a synthetic organ."""
 
 import numpy as np
 from scipy.ndimage import gaussian_filter
@@ -16,24 +16,26 @@ from studies.geometry.surface.node_count import handles_of
 from studies.geometry.surface.repair import largest_part
 
 COARSEST, FINEST = 1 / 40, 1 / 160
-"""Cells of the grid over the diagonal of the box: enough for the thin parts of an organ, and at most 20 s of work."""
+"""Limits of the cell edge over the diagonal of the box: fine enough for the thin parts of an organ, coarse enough for
+at most 20 s of work."""
 CELLS_PER_EDGE = 2.5
-"""Cells along an edge of the wanted mesh, between these limits."""
+"""Cells along an edge of the mesh, within these limits."""
 MISSED, FINER = 0.01, 1.6
-"""Distance over the diagonal at which the grid is made so many times finer: half of the limit of the warning."""
+"""Distance over the diagonal beyond which the grid is refined, half of fidelity.NOTABLE; and the factor by which the
+cells then shrink."""
 ASKED = 5000
-"""Nodes of the file at which that is looked at."""
+"""Most nodes of the file at which this distance is measured."""
 ROOM = 4
-"""Cells between the surface and the walls of the grid: the mesher's steps stay inside."""
+"""Cells between the surface and the walls of the grid, so that the steps of the mesher stay inside."""
 
 Surface = tuple[np.ndarray, np.ndarray]
 
 
 def scan_shape(points: np.ndarray, triangles: np.ndarray, nodes: int, smooth: float = 0.0, name: str = "scan") -> Shape:
-    """The shape of which the closed outward triangulation points (n, 3) [m], triangles (t, 3) is a picture.
+    """The shape that a closed outward triangulation of points (n, 3) [m] and triangles (t, 3) approximates.
 
-    nodes: of the mesh that is wanted, which decides the grid. smooth: see levelled; 0: only the facets of the file are
-    rounded, within a cell. Raises StudyError when nothing of the shape is left on the grid.
+    nodes: of the mesh to be made, which decides the grid. smooth [m]: as in `levelled`; 0: only the facets of the file
+    are rounded, within a cell. Raises StudyError if smoothing leaves nothing of the shape.
     """
     cell = cell_for(points, triangles, nodes)
     if smooth > 0:
@@ -42,18 +44,18 @@ def scan_shape(points: np.ndarray, triangles: np.ndarray, nodes: int, smooth: fl
 
 
 def cell_for(points: np.ndarray, triangles: np.ndarray, nodes: int) -> float:
-    """Edge [m] of the grid's cells for a mesh of so many nodes."""
+    """Edge [m] of the grid cells for a mesh of so many nodes."""
     diagonal, area = box_of(points, triangles)
     edge = np.sqrt(4.0 / np.sqrt(3.0) * area / (2.0 * nodes))
     return float(np.clip(edge / CELLS_PER_EDGE, FINEST * diagonal, COARSEST * diagonal))
 
 
 def levelled(points: np.ndarray, triangles: np.ndarray, cell: float, smooth: float, name: str) -> Surface:
-    """The surface without what is finer than the length `smooth` [m].
+    """The surface without details finer than the length `smooth` [m].
 
-    Folds narrower than twice as much are closed (Serra's morphological closing: out by that length and back in) and
-    finer bumps are levelled (a Gaussian of half that length on the signed distance), the volume after closing being
-    kept. cell: the coarsest grid [m]. Raises StudyError when nothing of the shape is left.
+    Folds narrower than twice `smooth` are closed by Serra's morphological closing: the surface moves out by `smooth`
+    and back in. Then a Gaussian of half that length on the signed distance levels bumps, and the volume after closing
+    is kept. cell: largest cell edge [m]. Raises StudyError if nothing of the shape is left.
     """
     diagonal, _ = box_of(points, triangles)
     if smooth >= 0.25 * diagonal:
@@ -65,17 +67,18 @@ def levelled(points: np.ndarray, triangles: np.ndarray, cell: float, smooth: flo
 
 
 def grid_on(points: np.ndarray, triangles: np.ndarray, cell: float) -> DistanceGrid:
-    """The signed distance to the surface on cells of edge `cell` [m]."""
+    """The signed distance to the surface on a grid of cells of edge `cell` [m]."""
     return distance_grid(points, triangles, cell, ROOM * cell)
 
 
 def faithful(
     points: np.ndarray, triangles: np.ndarray, cell: float, name: str, allowed: float = MISSED
 ) -> tuple[DistanceGrid, Surface]:
-    """The signed distance to a surface and its first triangulation, on a grid as fine as keeps its thin parts.
+    """The signed distance to a surface and its first triangulation, on a grid fine enough for its thin parts.
 
-    Where the triangulation misses more than `allowed` of the diagonal, the cells, at first `cell` [m], get finer, down
-    to FINEST. A finer one with more handles is not used: they are holes of the grid in what is too thin for it.
+    The cells start at `cell` [m] and shrink, down to FINEST of the diagonal, as long as the surface is farther than
+    `allowed` of the diagonal from the triangulation. A finer grid with more handles is not used: the handles are holes
+    in parts that are too thin for it.
     """
     diagonal, _ = box_of(points, triangles)
     grid = grid_on(points, triangles, cell)
@@ -90,18 +93,18 @@ def faithful(
 
 
 def missed(points: np.ndarray, triangles: np.ndarray, start: Surface) -> float:
-    """Largest distance [m] of the nodes of a surface to a triangulation of it, those of large files thinned out."""
+    """Largest distance [m] of the nodes of a surface from a triangulation of it, measured at ASKED nodes at most."""
     used = np.unique(triangles)
     return float(distance_to_surface(points[used[:: -(-len(used) // ASKED)]], *start).max())
 
 
 def scan_surface(shape: Shape) -> Surface:
-    """The first triangulation of a scan: its largest part, without what broke off in parts thinner than a cell."""
+    """The first triangulation of a scan, reduced to its largest part: parts thinner than a cell leave fragments."""
     return largest_part(*first_surface(shape))
 
 
 def smoothed(points: np.ndarray, triangles: np.ndarray, cell: float, smooth: float, name: str) -> Surface:
-    """The surface after closing and levelling; see scan_shape."""
+    """The surface after closing and levelling on cells of edge `cell` [m]; see `levelled`."""
     room = smooth + ROOM * cell
     out = iso_surface(distance_grid(points, triangles, cell, room + smooth), smooth, name)
     back = iso_surface(distance_grid(*out, cell, room), -smooth, name)
@@ -117,7 +120,10 @@ def smoothed(points: np.ndarray, triangles: np.ndarray, cell: float, smooth: flo
 
 
 def iso_surface(grid: DistanceGrid, value: float, name: str) -> Surface:
-    """The largest part of the surface where the distance is `value` [m], outward."""
+    """The largest part of the surface where the distance is `value` [m], with outward triangles.
+
+    Raises StudyError if no distance of the grid is below the value, or none above it.
+    """
     if not grid.values.min() < value < grid.values.max():
         raise StudyError(
             f"{name}: nothing of the body is left {1e3 * abs(value):.3g} mm inside its surface; smooth less"

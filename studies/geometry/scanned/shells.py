@@ -1,4 +1,4 @@
-"""Thin shells and open surfaces as the solid bodies that they enclose: capsules, double walls, surfaces with holes."""
+"""The solid bodies that thin shells and open surfaces enclose: capsules, double walls, surfaces with holes."""
 
 import numpy as np
 from scipy.ndimage import distance_transform_edt, gaussian_filter, label
@@ -8,16 +8,17 @@ from studies.geometry.scanned.distance_grid import DistanceGrid, squared_distanc
 from studies.geometry.scanned.scan_shape import FINEST, ROOM, Surface, iso_surface
 
 LEAST = 1.0
-"""Cells by which a wall is thickened at least, so that it is tight on the grid."""
+"""Smallest thickening of a wall in cells, which makes it tight on the grid."""
 ROUND = 0.7
-"""Width of the Gaussian, in cells, that takes the cells' steps away."""
+"""Standard deviation of the Gaussian, in cells, that removes the steps of the cells."""
 
 
 def solidified(points: np.ndarray, triangles: np.ndarray, opening: float, name: str) -> Surface:
-    """The outer sheet of what triangles (t, 3) on points (n, 3) [m] enclose, openings up to `opening` [m] wide closed.
+    """Outer surface of what triangles (t, 3) on points (n, 3) [m] enclose; openings up to `opening` [m] are closed.
 
-    The triangles may be open, doubled or one-sided. They are thickened by half the opening; the region that is then
-    reachable from outside is the outside, and grows back by the same amount. Raises StudyError if nothing is enclosed.
+    The triangles may be open, doubled or one-sided. They are thickened by half the opening or LEAST cells. The region
+    that is then reachable from outside is the outside, and it grows back by the same amount. Raises StudyError if
+    nothing is enclosed.
     """
     used = points[np.unique(triangles)]
     cell = FINEST * float(np.linalg.norm(np.ptp(used, axis=0)))
@@ -29,7 +30,7 @@ def solidified(points: np.ndarray, triangles: np.ndarray, opening: float, name: 
     regions = np.empty(away.shape, np.int32)
     label(away > reach, output=regions)
     inside = cell * np.asarray(distance_transform_edt(regions != regions[0, 0, 0])) > reach
-    # Half a cell: the border lies between the last cell of one side and the first of the other.
+    # The border lies between the last cell of one side and the first of the other, hence half a cell.
     steps = cell * (np.asarray(distance_transform_edt(inside)) + np.asarray(distance_transform_edt(~inside)) - 0.5)
     values = np.where(inside, -1.0, 1.0) * np.minimum(away, steps)
     if not inside.any() or not (away[inside] > 2 * cell).any():

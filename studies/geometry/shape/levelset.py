@@ -1,4 +1,4 @@
-"""An organ as a function: f(x) < 0 inside, f(x) = 0 its surface; and the way onto that surface."""
+"""An organ as a level function, f(x) < 0 inside and f(x) = 0 on its surface, and the projection onto the surface."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
@@ -13,8 +13,7 @@ Level = Callable[[np.ndarray], np.ndarray]
 
 @dataclass(frozen=True)
 class Literature:
-    """Values from textbooks or patient series: the volume [mL] of an adult's organ, for a hollow one that of its
-    content."""
+    """Volume [mL] of an adult's organ from a textbook or a patient series; for a hollow organ that of its content."""
 
     volume_ml: float
     source: str
@@ -22,7 +21,8 @@ class Literature:
 
 @dataclass(frozen=True)
 class PalpationPoint:
-    """A smooth, freely reachable surface point [m] and the outward unit normal there; a probe moves against it."""
+    """A smooth, freely reachable surface point [m] and the outward unit normal there; a probe moves against the
+    normal."""
 
     point: Vector
     normal: Vector
@@ -30,15 +30,15 @@ class PalpationPoint:
 
 @dataclass(frozen=True, eq=False)
 class Shape:
-    """An organ's true shape.
+    """The true shape of an organ.
 
     level: f(points (n, 3) [m]) -> (n,) [m], negative inside, smooth near its zero set, |grad f| of order 1
-    low, high: corners of a box that holds the organ with at least two cells to spare [m]
-    cell: edge of the grid on which f is first sampled [m]; finer than the thinnest part
-    regions: the attachments it has by default
-    wall: thickness of the wall of a hollow organ, whose lumen is f = -wall [m]; None for a solid one
-    literature: the volume that the default parameters are held to
-    probe, press: where an instrument palpates, and the unit vector along which a plane presses; None when not given
+    low, high: corners [m] of a box around the organ, which leaves more than one cell on every side
+    cell: edge [m] of the grid on which f is first sampled; smaller than the thinnest part
+    regions: default attachments
+    wall: thickness [m] of the wall of a hollow organ, whose lumen is bounded by f = -wall; None for a solid organ
+    literature: the volume that the default parameters have to match, with its source
+    probe, press: where an instrument palpates, and the unit vector along which a plane presses; None if there is none
     """
 
     name: str
@@ -59,12 +59,12 @@ class Shape:
 
 
 def at_depth(shape: Shape, depth: float) -> Shape:
-    """The body inside f = -depth [m]: the lumen of a hollow organ when depth is its wall."""
+    """The body inside f = -depth [m]; with depth = wall it is the lumen of a hollow organ."""
     return replace(shape, level=lambda points: shape.level(points) + depth)
 
 
 def gradient(level: Level, points: np.ndarray, step: float) -> np.ndarray:
-    """Central difference of f, shape (n, 3), with the given step [m]."""
+    """Gradient of f at points (n, 3) by central differences, shape (n, 3); `step` in the unit of the points."""
     count = len(points)
     shifts = step * np.vstack([np.eye(3), -np.eye(3)])
     values = level((points[None, :, :] + shifts[:, None, :]).reshape(-1, 3)).reshape(6, count)
@@ -78,18 +78,19 @@ def normals(shape: Shape, points: np.ndarray) -> np.ndarray:
 
 
 STALE = 0.05
-"""A step that leaves more than this share of the residual takes new gradients before the next one."""
+"""If a step leaves more than this share of the residual, the next step computes new gradients."""
 STEPS = 60
 
 
 def project(
     shape: Shape, points: np.ndarray, constraints: tuple[Level, ...] = (), within: float | None = None
 ) -> np.ndarray:
-    """Move points (n, 3) [m] onto f = 0, and onto g = 0 for every further constraint g.
+    """Points (n, 3) [m] projected onto f = 0, and onto g = 0 for every further constraint g, shape (n, 3) [m].
 
-    Newton's method with the smallest correction, d = -A^T (A A^T)^-1 r with the gradients as rows of A, which are kept
-    while they serve (chord method). within: residual [m] at which a point stays; rounding when None. Raises StudyError
-    where it does not converge, which happens only far from the surface or where the constraints do not meet.
+    Newton's method takes the smallest correction, d = -A^T (A A^T)^-1 r with the gradients as rows of A. It keeps the
+    gradients as long as the residual falls fast (chord method). within: residual [m] at which a point stays; None:
+    1e-13 of the size of the box. Raises StudyError if it does not converge: far from the surface, or where the
+    constraints do not meet.
     """
     x = np.array(points, float)
     levels = (shape.level, *constraints)
@@ -107,7 +108,7 @@ def project(
         a, r = rows[moving], residual[moving]
         gram = a @ a.transpose(0, 2, 1) + 1e-12 * np.eye(len(levels))
         d = -(a.transpose(0, 2, 1) @ np.linalg.solve(gram, r[:, :, None]))[:, :, 0]
-        # A step longer than a cell leaves the neighbourhood in which the gradient means anything.
+        # A step longer than a cell leaves the neighbourhood in which the gradient is valid.
         d *= np.minimum(1.0, shape.cell / np.maximum(np.linalg.norm(d, axis=1), 1e-300))[:, None]
         x[moving] += d
         residual[moving] = np.stack([level(x[moving]) for level in levels], axis=1)
@@ -121,9 +122,10 @@ def project(
 
 
 def forward_gradients(levels: tuple[Level, ...], x: np.ndarray, values: np.ndarray, step: float) -> np.ndarray:
-    """Gradients, shape (n, l, 3), of l levels at x (n, 3) [m] where they have `values` (n, l), by forward differences.
+    """Gradients, shape (n, l, 3), of l levels by forward differences with `step` [m] at x (n, 3) [m].
 
-    Good enough for Newton's method, whose residual and not its gradient decides where the points end.
+    values: the levels at x, shape (n, l). These gradients suffice for Newton's method, because its residual decides
+    where the points end.
     """
     shifted = (x[None, :, :] + step * np.eye(3)[:, None, :]).reshape(-1, 3)
     ahead = np.stack([level(shifted).reshape(3, len(x)) for level in levels], axis=2)

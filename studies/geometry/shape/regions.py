@@ -1,7 +1,7 @@
-"""Where an organ is attached, defined by geometry: the same place on a mesh of any size.
+"""Where an organ is attached: a part of space, which is the same for meshes of any size.
 
-A region is a part of space with a signed level, negative inside. The patch of a surface that lies in it is bounded
-by the curve level = 0, onto which the mesher moves nodes (snap.py), so the patch does not depend on the mesh.
+A region has a signed level, negative inside. The patch of a surface that lies in it is bounded by the curve level = 0,
+onto which the mesher moves nodes (snap.py), so the patch does not depend on the mesh.
 """
 
 from dataclasses import asdict, dataclass
@@ -14,26 +14,26 @@ from studies.base.errors import StudyError
 Vector = tuple[float, float, float]
 
 ON_CURVE = 1e-10
-"""A node counts as on the outline within this fraction of the size of the box: far above rounding, far below edges."""
+"""A node within this fraction of the box size from an outline lies on it: far above rounding, far below edges."""
 
 
 class Region(Protocol):
-    """Part of space; `level` is a length [m], negative inside."""
+    """Part of space in which an organ is attached."""
 
     def level(self, points: np.ndarray) -> np.ndarray:
-        """Signed level [m], shape (n,), of points [m], shape (n, 3)."""
+        """Signed level [m], shape (n,), of points (n, 3) [m]: negative inside."""
         ...
 
 
 @dataclass(frozen=True)
 class HalfSpace:
-    """Points with normal . (x - point) <= 0: `normal` points out of the region, as on a body."""
+    """Points x [m] with normal . (x - point) <= 0: `normal`, of any length, points out of the region."""
 
     point: Vector
     normal: Vector
 
     def level(self, points: np.ndarray) -> np.ndarray:
-        """Signed distance [m], shape (n,)."""
+        """Signed distance [m], shape (n,), of points (n, 3) [m]. Raises StudyError for a normal of length 0."""
         normal = np.asarray(self.normal, float)
         length = np.linalg.norm(normal)
         if not length > 0:
@@ -49,7 +49,7 @@ class BallRegion:
     radius: float
 
     def level(self, points: np.ndarray) -> np.ndarray:
-        """Signed distance [m], shape (n,)."""
+        """Signed distance [m], shape (n,), of points (n, 3) [m]. Raises StudyError unless the radius is above 0."""
         if not self.radius > 0:
             raise StudyError(f"a ball region of radius {self.radius} m is empty; give a radius above 0")
         return np.linalg.norm(np.asarray(points, float) - self.center, axis=1) - self.radius
@@ -57,13 +57,16 @@ class BallRegion:
 
 @dataclass(frozen=True)
 class EllipsoidRegion:
-    """Points inside an ellipsoid with semi-axes [m] along x, y, z."""
+    """Points inside an ellipsoid around `center` [m] with semi-axes [m] along x, y, z."""
 
     center: Vector
     semi_axes: Vector
 
     def level(self, points: np.ndarray) -> np.ndarray:
-        """Scaled level [m], shape (n,): zero on the ellipsoid, not a distance away from it."""
+        """Scaled level [m], shape (n,), of points (n, 3) [m]: 0 on the ellipsoid, but no distance elsewhere.
+
+        Raises StudyError unless all semi-axes are above 0.
+        """
         axes = np.asarray(self.semi_axes, float)
         if not (axes > 0).all():
             raise StudyError(f"an ellipsoid region with semi-axes {self.semi_axes} m is empty; give lengths above 0")
@@ -72,45 +75,47 @@ class EllipsoidRegion:
 
 
 BATCH = 4096
-"""Points whose distances to all samples are held at once."""
+"""Points whose distances to all samples are in memory at the same time."""
 
 
 @dataclass(frozen=True)
 class PaintedRegion:
-    """What is painted on a surface, between samples of it; `studies.geometry.painted` makes one.
+    """The painted part of a surface, interpolated between samples; `studies.geometry.painted` makes one from a file.
 
-    samples: x, y, z of a place on the surface [m] and the area that it stands for [m²], negative where not painted
-    width: standard deviation [m] of the Gaussian that rounds the steps of the painted border
+    samples: x, y, z [m] of points on the surface and the area [m²] that each represents, negative where not painted
+    width: standard deviation [m] of the Gaussian that smooths the steps of the painted border
     """
 
     samples: tuple[tuple[float, float, float, float], ...]
     width: float
 
     def level(self, points: np.ndarray) -> np.ndarray:
-        """About the distance [m] along the surface to the painted border, shape (n,), of points near the surface.
+        """Signed level [m], shape (n,), of points (n, 3) [m] near the surface: about the distance to the border.
 
-        The border is where the samples inside and those outside, each a Gaussian of its area, have the same density.
+        Each sample is a Gaussian weighted with its area. On the border the painted samples and the others have the same
+        density.
         """
         points, rows = np.asarray(points, float), np.asarray(self.samples, float)
         odds = np.concatenate([self._odds(points[k : k + BATCH], rows) for k in range(0, max(len(points), 1), BATCH)])
-        # Beside a straight border log(Phi(t) / Phi(-t)), t = s / width: 4 phi(0) t near it, t² / 2 far from it.
+        # At distance s from a straight border the odds are log(Phi(t) / Phi(-t)), t = s / width: 4 phi(0) t near it and
+        # t² / 2 far from it.
         slope = 4.0 / np.sqrt(2.0 * np.pi)
         return self.width * odds / (slope * np.sqrt(1.0 + np.abs(odds) / (2.0 * slope**2)))
 
     def _odds(self, points: np.ndarray, rows: np.ndarray) -> np.ndarray:
-        """Logarithm of the density outside over that inside, shape (n,)."""
+        """Logarithm of the density of samples outside over that inside, shape (n,); rows (s, 4): samples."""
         densities = []
         for part in (rows[rows[:, 3] > 0], rows[rows[:, 3] < 0]):
             squared = sum((points[:, k, None] - part[None, :, k]) ** 2 for k in range(3))
             terms = np.log(np.abs(part[:, 3])) - squared / (2.0 * self.width**2)
-            # The largest is taken out: far away all of them are too small for a number.
+            # Subtracting the largest term avoids underflow far away.
             most = terms.max(axis=1)
             densities.append(most + np.log(np.exp(terms - most[:, None]).sum(axis=1)))
         return densities[1] - densities[0]
 
 
 KnownRegion = HalfSpace | BallRegion | EllipsoidRegion | PaintedRegion
-"""Those that can be stored as JSON."""
+"""Regions that can be stored as JSON."""
 
 KINDS: dict[str, type] = {cls.__name__: cls for cls in (HalfSpace, BallRegion, EllipsoidRegion, PaintedRegion)}
 
@@ -125,6 +130,6 @@ def region_to_dict(region: Any) -> dict[str, Any]:
 
 
 def region_from_dict(data: dict[str, Any]) -> Region:
-    """The region of which `data` is the JSON-able form."""
+    """The region with the JSON-able form `data`. Raises KeyError for an unknown kind."""
     fields = {key: tuple(value) if isinstance(value, list) else value for key, value in data.items() if key != "kind"}
     return KINDS[data["kind"]](**fields)

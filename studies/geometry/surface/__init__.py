@@ -1,1 +1,1 @@
-"""Triangles: made, moved onto a level function, edited, repaired, compared."""
+"""Triangulations: making, moving onto a level function, editing, repairing and comparing them."""

@@ -1,19 +1,19 @@
-"""Which boxes overlap: the broad phase of a search for intersections."""
+"""Finds overlapping boxes: the broad phase of a search for intersections."""
 
 from collections.abc import Iterator
 
 import numpy as np
 
 AT_ONCE = 1_000_000
-"""Pairs of boxes followed at a time: some tens of megabytes."""
+"""Pairs of boxes that are followed at the same time: some tens of megabytes."""
 BITS = 10
 
 
 def overlapping_boxes(low: np.ndarray, high: np.ndarray) -> Iterator[np.ndarray]:
-    """Pairs (p, 2), lower index first, of boxes low, high (n, 3) that touch, in portions.
+    """Yields in portions the pairs (p, 2), lower index first, of boxes with corners low, high (n, 3) that touch.
 
-    The boxes are put in order along a Z-curve; repeated halves of that order have bounding boxes (a tree without
-    pointers), and pairs of tree nodes are followed downwards as long as their boxes touch.
+    The boxes are sorted along a Z-curve. Repeated halving of that order gives a tree of bounding boxes without
+    pointers, and pairs of tree nodes are followed downwards as long as their boxes touch.
     """
     if not len(low):
         return
@@ -32,7 +32,7 @@ def overlapping_boxes(low: np.ndarray, high: np.ndarray) -> Iterator[np.ndarray]
 
 
 def children(pairs: np.ndarray) -> np.ndarray:
-    """Pairs of children of pairs of nodes, each once: a node with itself has three."""
+    """Pairs of children of pairs of tree nodes (p, 2), each once: a pair of a node with itself has three."""
     a, b = 2 * pairs.T
     every = np.concatenate([np.stack([a + i, b + j], axis=1) for i in (0, 1) for j in (0, 1)])
     return every[every[:, 0] <= every[:, 1]]
@@ -48,7 +48,7 @@ def touching(pairs: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray
 
 
 def tree(low: np.ndarray, high: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Boxes of all levels, the root's first; the last level is filled up with boxes that touch nothing."""
+    """Low and high corners of the boxes of all levels, the root first; boxes that touch nothing fill the last level."""
     size = 1 << max(0, int(np.ceil(np.log2(len(low)))))
     empty = np.full((size - len(low), 3), np.inf)
     levels = [(np.concatenate([low, empty]), np.concatenate([high, -empty]))]
@@ -59,7 +59,7 @@ def tree(low: np.ndarray, high: np.ndarray) -> list[tuple[np.ndarray, np.ndarray
 
 
 def z_curve(points: np.ndarray) -> np.ndarray:
-    """Places of points (n, 3) along a Z-curve through their box, (n,): the bits of the coordinates in turn."""
+    """Positions (n,) of points (n, 3) on a Z-curve through their box: the interleaved bits of their coordinates."""
     span = np.maximum(np.ptp(points, axis=0), 1e-300)
     cells = ((points - points.min(axis=0)) / span * (2**BITS - 1)).astype(np.int64)
     bits = [((cells[:, k] >> bit) & 1) << (3 * bit + k) for bit in range(BITS) for k in range(3)]

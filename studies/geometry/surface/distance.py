@@ -4,26 +4,26 @@ import numpy as np
 from scipy.spatial import KDTree
 
 CANDIDATES = 12
-"""Triangles looked at first per point, by their centroids: twice the six around a node. The distance does not depend on
-it; with fewer, more points are looked at again."""
+"""Triangles with the nearest centroids that are tested first per point: twice the six around a node. The distance does
+not depend on this number; with a smaller one more points are tested again."""
 
 
 class SurfaceDistance:
-    """Distances to one surface, of as many sets of points as wanted."""
+    """Distances of any number of sets of points to one surface."""
 
     def __init__(self, points: np.ndarray, triangles: np.ndarray):
-        """points (n, 3) [m], triangles (f, 3)."""
+        """Points (n, 3) [m] and triangles (f, 3) of the surface."""
         self.corners = np.asarray(points, float)[triangles]
         centroids = self.corners.mean(axis=1)
         self.reach = np.linalg.norm(self.corners - centroids[:, None], axis=2).max()
         self.tree = KDTree(centroids)
 
     def __call__(self, queries: np.ndarray) -> np.ndarray:
-        """Distance [m] of each of `queries` (q, 3), (q,)."""
+        """Distance [m] of each of the points `queries` (q, 3) [m], shape (q,)."""
         return self.nearest(queries)[0]
 
     def nearest(self, queries: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Distance [m] of each of `queries` (q, 3), and the number of its nearest triangle, both (q,)."""
+        """Distance [m] of each of the points `queries` (q, 3) [m], and the index of its nearest triangle, both (q,)."""
         distance, nearest, total = np.empty(len(queries)), np.empty(len(queries), np.int64), len(self.corners)
         pending, count = np.arange(len(queries)), min(CANDIDATES, total)
         while len(pending):
@@ -31,27 +31,29 @@ class SurfaceDistance:
             distance[pending], nearest[pending] = _to_triangles(queries[pending], self.corners, near)
             if count == total:
                 break
-            # A triangle not looked at has its centroid beyond the last one's, and no point nearer than that less reach.
+            # The centroid of any other triangle is at least as far as the last one, so the triangle is farther than
+            # that distance minus reach.
             pending = pending[away[:, -1] - self.reach < distance[pending]]
             count = min(2 * count, total)
         return distance, nearest
 
 
 class ChangingFacets:
-    """Distances between a fixed surface and one of which few facets change from call to call, in both directions."""
+    """Distances in both directions between a fixed surface and one of which few facets change from call to call."""
 
     def __init__(self, points: np.ndarray, triangles: np.ndarray):
-        """points (n, 3) [m] and triangles (f, 3) of the fixed surface."""
+        """Points (n, 3) [m] and triangles (f, 3) of the fixed surface."""
         self.samples, self.fixed = points, SurfaceDistance(points, triangles)
         self.rows: dict[bytes, int] = {}
         self.ahead, self.owner = np.empty(len(points)), np.full(len(points), -1)
         self.behind: np.ndarray | None = None
 
     def measure(self, places: np.ndarray, pieces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Distances [m] of the points (n,) of the fixed surface to the other one, and of its places (t, p) to the
-        fixed surface. They are those of SurfaceDistance to the bit.
+        """Distances [m] of the points of the fixed surface to the other one, (n,), and of `places` to the fixed
+        surface, (t, p). They equal those of SurfaceDistance bit for bit.
 
-        places: on t facets, (t, p, 3) [m]; pieces: flat triangles between those of one facet, (k, 3).
+        places: p points on each of t facets of the other surface, (t, p, 3) [m]; pieces: flat triangles between the
+        points of one facet, (k, 3).
         """
         keys = [facet.tobytes() for facet in places]
         before = np.array([self.rows.get(key, -1) for key in keys])
@@ -60,7 +62,7 @@ class ChangingFacets:
         if self.behind is not None:
             behind[kept] = self.behind[before[kept]]
         behind[new] = self.fixed(places[new].reshape(-1, 3)).reshape(len(new), places.shape[1])
-        # Row of each facet of the last call among these; -1 of one that is gone.
+        # Row of each facet of the last call among those of this call; -1 for a facet that is gone.
         after = np.full(len(self.rows) + 1, -1)
         after[before[kept]] = kept
         owner, ahead = after[self.owner], self.ahead.copy()
@@ -80,20 +82,20 @@ class ChangingFacets:
 
 
 def _apart(places: np.ndarray, pieces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Points (t p, 3) and triangles (t k, 3) of facets that share no point."""
+    """Points (t p, 3) and triangles (t k, 3) of facets with places (t, p, 3), which share no point."""
     first = places.shape[1] * np.arange(len(places))
     return places.reshape(-1, 3), (pieces + first[:, None, None]).reshape(-1, 3)
 
 
 def distance_to_surface(queries: np.ndarray, points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Distance [m] of each of `queries` (q, 3) to the surface `triangles` (f, 3) on `points` (n, 3), (q,)."""
+    """Distance [m], shape (q,), of `queries` (q, 3) [m] to the surface of points (n, 3) [m] and triangles (f, 3)."""
     return SurfaceDistance(points, triangles)(queries)
 
 
 def _to_triangles(queries: np.ndarray, corners: np.ndarray, near: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Smallest distance [m] of each query (q, 3) to its triangles `near` (q, k) of `corners` (f, 3, 3), and the number
+    """Smallest distance [m] of each query (q, 3) to its triangles `near` (q, k) of `corners` (f, 3, 3), and the index
     of that triangle, both (q,)."""
-    # Loaded where it is used: what compiles takes half a second to import.
+    # Imported here, because compiled code takes half a second to import.
     from studies.geometry.surface.triangle_distance import nearest_into
 
     squared, nearest = np.empty(len(queries)), np.empty(len(queries), np.int64)
@@ -102,7 +104,7 @@ def _to_triangles(queries: np.ndarray, corners: np.ndarray, near: np.ndarray) ->
 
 
 def hausdorff(points_a: np.ndarray, triangles_a: np.ndarray, points_b: np.ndarray, triangles_b: np.ndarray) -> float:
-    """Symmetric Hausdorff distance [m] of two surfaces, seen from the nodes of each."""
+    """Symmetric Hausdorff distance [m] of two surfaces, measured at the nodes of each: a lower bound."""
     from_a = distance_to_surface(points_a[np.unique(triangles_a)], points_b, triangles_b)
     from_b = distance_to_surface(points_b[np.unique(triangles_b)], points_a, triangles_a)
     return float(max(from_a.max(), from_b.max()))

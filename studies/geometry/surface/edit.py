@@ -1,4 +1,4 @@
-"""Small edits of a closed triangulation: nodes added, removed, edges turned."""
+"""Small edits of a closed triangulation: adding and removing nodes, flipping edges."""
 
 from collections.abc import Callable
 
@@ -9,9 +9,10 @@ from studies.geometry.mesh.quality import triangle_radius_ratio
 
 
 def with_node_count(points: np.ndarray, triangles: np.ndarray, nodes: int) -> tuple[np.ndarray, np.ndarray]:
-    """The triangulation with exactly `nodes` nodes where it allows: longest edges split or shortest ones collapsed.
+    """The triangulation after its longest edges are split or its shortest ones collapsed, until it has `nodes` nodes.
 
-    Edits keep to themselves: the neighbourhood of one is not edited again. Returns as near as that permits.
+    The neighbourhood of an edit is not edited again, so the result may have another number of nodes, as near as this
+    allows.
     """
     split = len(points) < nodes
     edges = pick_edges(points, triangles, abs(len(points) - nodes), split)
@@ -20,14 +21,18 @@ def with_node_count(points: np.ndarray, triangles: np.ndarray, nodes: int) -> tu
             points, triangles = split_edge(points, triangles, edges[k])
         else:
             points, triangles = collapse_edge(points, triangles, edges[k])
-            # The node that vanished leaves no gap in the numbering.
+            # A collapse renumbers the nodes after the removed one.
             edges = edges - (edges > edges[k, 1])
     return points, triangles
 
 
 def pick_edges(points: np.ndarray, triangles: np.ndarray, most: int, split: bool) -> np.ndarray:
-    """Up to `most` edges, shape (e, 2), the longest to split or the shortest to collapse, far from each other, that
-    leave 4 to 7 edges at every node around."""
+    """Up to `most` edges, shape (e, 2), whose neighbourhoods are disjoint: the longest to split, or the shortest to
+    collapse.
+
+    After a split the opposite nodes have at most 7 edges. After a collapse they have at least 4, and the merged node
+    has at most 7.
+    """
     edges = unique_edges(triangles)
     valence = np.bincount(edges.ravel(), minlength=len(points))
     length = np.linalg.norm(points[edges[:, 0]] - points[edges[:, 1]], axis=1)
@@ -44,7 +49,7 @@ def pick_edges(points: np.ndarray, triangles: np.ndarray, most: int, split: bool
             continue
         shared = np.intersect1d(one, other)
         opposite = shared[(shared != edge[0]) & (shared != edge[1])]
-        # A collapse keeps the surface a manifold only where the ends share exactly the two opposite nodes.
+        # A collapse keeps the surface a manifold only if the ends share exactly the two opposite nodes.
         collapsible = len(shared) == 4 and valence[edge].sum() - 4 <= 7 and (valence[opposite] >= 5).all()
         if (valence[opposite] <= 6).all() if split else collapsible:
             picked.append(edge)
@@ -53,7 +58,7 @@ def pick_edges(points: np.ndarray, triangles: np.ndarray, most: int, split: bool
 
 
 def split_edge(points: np.ndarray, triangles: np.ndarray, edge: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """A node in the middle of the edge; its two triangles become four."""
+    """The surface with a node in the middle of the edge, the last one; the two triangles of the edge become four."""
     middle = len(points)
     both = np.isin(triangles, edge).sum(axis=1) == 2
     halves = [np.where(triangles[both] == node, middle, triangles[both]) for node in edge]
@@ -61,7 +66,7 @@ def split_edge(points: np.ndarray, triangles: np.ndarray, edge: np.ndarray) -> t
 
 
 def collapse_edge(points: np.ndarray, triangles: np.ndarray, edge: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The edge's ends become one node in its middle; its two triangles vanish."""
+    """The surface with the ends of the edge merged in its middle; the two triangles of the edge are removed."""
     keep, drop = edge
     points = points.copy()
     points[keep] = points[edge].mean(axis=0)
@@ -73,10 +78,11 @@ def collapse_edge(points: np.ndarray, triangles: np.ndarray, edge: np.ndarray) -
 def flip_edges(
     points: np.ndarray, triangles: np.ndarray, edges: np.ndarray, allowed: Callable[[int, int], bool], floor: float
 ) -> np.ndarray:
-    """The triangles with each of the edges (e, 2) turned in its quadrilateral, where that helps.
+    """The triangles with each of the edges (e, 2) flipped in its quadrilateral, if that helps.
 
-    It helps when the new edge is new and `allowed(k, l)`, when the two new triangles are better than the worse old one
-    or than `floor`, and when they look the same way (within 60 degrees of the old ones together).
+    It helps if no edge joins the opposite nodes k, l yet and `allowed(k, l)`, if both new triangles have at least the
+    radius ratio `floor` or 0.01 more than the worse old one, and if their normals are within 60 degrees of the sum of
+    the old ones.
     """
     triangles = triangles.copy()
     for i, j in edges:

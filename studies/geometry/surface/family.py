@@ -1,4 +1,4 @@
-"""The volume that a family of meshes converges to."""
+"""The volume to which a family of meshes converges."""
 
 import numpy as np
 
@@ -8,17 +8,17 @@ from studies.geometry.surface.first_surface import first_surface
 
 
 def true_volume(shape: Shape, refinements: int = 2) -> float:
-    """Volume [m^3] of the tissue of a shape, without its lumen, to about 1e-6.
-
-    A fine triangulation is quartered `refinements` times with its nodes on the true surface; its volume is a series in
-    the squared edge, extrapolated by Romberg's scheme.
-    """
+    """Volume [m^3] of the tissue of a shape, without its lumen, to about 1e-6 of it; see `enclosed_volume`."""
     outer = enclosed_volume(shape, refinements)
     return outer if shape.wall is None else outer - enclosed_volume(at_depth(shape, shape.wall), refinements)
 
 
 def enclosed_volume(shape: Shape, refinements: int) -> float:
-    """Volume [m^3] inside f = 0."""
+    """Volume [m^3] inside f = 0. Raises StudyError if the surface is not inside its box.
+
+    The triangles of a fine triangulation are quartered `refinements` times, with nodes on the true surface. The volume
+    is a series in the squared edge length, which Romberg's scheme extrapolates.
+    """
     points, triangles = first_surface(shape)
     row = [signed_volume(points, triangles)]
     for _ in range(refinements):
@@ -31,7 +31,7 @@ def enclosed_volume(shape: Shape, refinements: int) -> float:
 
 
 def quartered(shape: Shape, points: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The triangulation with every edge halved at a new node on f = 0, every triangle cut into four."""
+    """The triangulation with every triangle divided into four by new nodes on f = 0 at the middles of its edges."""
     count = len(points)
     edges = unique_edges(triangles)
     key = edges @ [count, 1]

@@ -1,4 +1,4 @@
-"""From a level function to a first closed triangulation: fine, smooth, but without regard to the wanted node count."""
+"""From a level function to a first closed triangulation: fine and smooth, but with any number of nodes."""
 
 import numpy as np
 from skimage.measure import marching_cubes
@@ -8,13 +8,14 @@ from studies.geometry.mesh.organ_mesh import signed_volume, unique_edges
 from studies.geometry.shape.levelset import Shape, project
 
 SWEEPS = 8
-"""Without the sweeps gmsh's reparametrisation hangs or crashes on two shapes of three: the cubes leave slivers."""
+"""Without these sweeps marching cubes leave slivers, and the parametrisation of gmsh hangs or crashes on two shapes of
+three."""
 
 
 def first_surface(shape: Shape) -> tuple[np.ndarray, np.ndarray]:
     """Points (n, 3) [m] on f = 0 and outward triangles (t, 3), with edges about as long as `shape.cell`.
 
-    Raises StudyError when f has no zero set in the box, or one that reaches its walls.
+    Raises StudyError if f has no zero set in the box, or one that reaches its walls.
     """
     counts = [max(4, int(np.ceil((b - a) / shape.cell)) + 1) for a, b in zip(shape.low, shape.high, strict=True)]
     axes = [np.linspace(a, b, n) for a, b, n in zip(shape.low, shape.high, counts, strict=True)]
@@ -34,7 +35,8 @@ def first_surface(shape: Shape) -> tuple[np.ndarray, np.ndarray]:
 
 
 def sweep(shape: Shape, points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Even out: SWEEPS times 0.7 of the way to the mean of the neighbours and one step back onto f = 0."""
+    """Points (n, 3) [m] after SWEEPS moves by 0.7 of the way to the mean of their neighbours, each followed by a
+    projection to within 1 % of a cell of f = 0; the last projection is exact."""
     edges = unique_edges(triangles)
     for _ in range(SWEEPS):
         points = project(shape, points + 0.7 * (neighbour_mean(points, edges) - points), within=0.01 * shape.cell)

@@ -1,4 +1,4 @@
-"""A surface mesh brought nearer to its shape where even nodes cut corners: thin margins, tips, the floor of folds."""
+"""Brings a surface mesh nearer to its shape where even nodes are too sparse: thin margins, tips, the floor of folds."""
 
 from collections.abc import Sequence
 from functools import cached_property
@@ -27,33 +27,34 @@ from studies.geometry.surface.snap import outlined
 Surface = tuple[np.ndarray, np.ndarray]
 
 FLOOR = 0.3
-"""Smallest radius ratio of a triangle that a new node may make; the fill still has good elements above 0.2."""
+"""Smallest radius ratio of a triangle that a new node may make; the fill has good elements above 0.2."""
 SHARPEST = -0.5
-"""Cosine between the normals of neighbours, 120 degrees, beyond which a new node may not fold them: slivers follow."""
+"""Smallest cosine between the normals of neighbours at a new node (120 degrees); a sharper fold gives slivers."""
 ROUNDS = 16
-"""Distances are measured at least so many times while nodes are added: each answers what the last nodes changed."""
+"""Smallest number of rounds in which nodes are added; each round measures the distances again."""
 TRIED = 30
-"""Places, the farthest first, at which a node is tried in vain before the search ends."""
+"""Points, the farthest first, that a round tries in addition to the number of nodes that it has to add."""
 ENOUGH = 0.003
-"""Deviation over the size below which no node is added for the sake of the shape."""
+"""Deviation over the size below which no node is added for the shape."""
 APART = 2.0
-"""Mean edges between nodes that are added in one round."""
+"""Smallest distance between nodes that are added in one round, in mean edges."""
 BEFORE = 0.6
-"""Share of the added nodes that come before the outlines of regions are laid: these cost some of the shape."""
+"""Share of the added nodes that come before the outlines of regions, which spoil the fit a little."""
 BESIDE = 2.5
-"""Edges from an outline within which the surface is evened out again: elsewhere it lies where its shape needs it."""
+"""Distance from an outline, in mean edges, within which the surface is relaxed; farther away nodes stay in place."""
 STRAIGHT, CURVED, AREA = 0.01, 0.007, 0.02
-"""Deviation from the shape over the size, of straight and of curved sides, and deviation of a region's area at which
-no other surface is tried."""
+"""Bounds of a good fit: deviation of straight and of curved sides from the shape, over the size, and relative deviation
+of the area of a region."""
 FEWEST_AT_OUTLINE = 10
-"""Nodes on the outline of a region: with fewer the region loses more than a few per cent of its area."""
+"""Edges of the outline of a region; with fewer the region loses more than a few per cent of its area."""
 
 
 def fitted(shape: Shape, base: Surface, nodes: int, regions: Sequence[Region], truth: Surface, curved: bool) -> "Fit":
-    """A surface with `nodes` nodes that follows its shape, the outline of every region on its edges.
+    """A surface that follows its shape, with the outline of every region on its edges and `nodes` nodes.
 
-    base: a surface of evenly spread nodes on f = 0, fewer than `nodes`; truth: a fine one; curved: the sides will be
-    quadratic. Raises StudyError where an outline cannot be laid, or triangles would cross.
+    It has fewer nodes if no edge can be split any more. base: a surface of evenly spread nodes on f = 0, fewer than
+    `nodes`; truth: a fine surface; curved: the sides will be quadratic. Raises StudyError if an outline does not fit,
+    or if triangles cross.
     """
     fit = Fit(shape, base, [], truth, curved)
     fit.grow(len(base[0]) + round(BEFORE * (nodes - len(base[0]))))
@@ -73,7 +74,7 @@ class Fit:
 
     def __init__(self, shape: Shape, surface: Surface, regions: Sequence[Region], truth: Surface, curved: bool):
         """surface: points (n, 3) [m] and triangles (t, 3) with the outlines of `regions` on edges; truth: the same of a
-        surface fine enough to stand for f = 0; curved: the sides will be quadratic, their middles on f = 0."""
+        surface fine enough to represent f = 0; curved: the sides will be quadratic, with mid-side nodes on f = 0."""
         self.shape, self.regions, self.curved = shape, list(regions), curved
         self.points, self.triangles = surface
         self.outlines = self.find_outlines()
@@ -90,7 +91,7 @@ class Fit:
         return float(max(away.max() for _, away in self.distances())) / self.size
 
     def area_error(self) -> float:
-        """Largest deviation of a region's area from that of the region on the true surface, over the latter [1]."""
+        """Largest relative deviation of the area of a region from that on the true surface [1]; 0 without regions."""
         errors = [0.0]
         points, facets = with_middles(self.shape, self.points, self.triangles, self.regions, self.curved)
         for region in self.regions:
@@ -100,25 +101,27 @@ class Fit:
         return max(errors)
 
     def badness(self) -> float:
-        """The worse of its deviation and its area error, each over the bound at which a search ends; 1 or less is good
-        enough [1]."""
+        """The larger of deviation and area error, each over its bound [1]; 1 or less is good enough."""
         return max(self.deviation() / (CURVED if self.curved else STRAIGHT), self.area_error() / AREA)
 
     def distances(self) -> tuple[tuple[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]:
-        """Places (m, 3) [m] on the true surface and their distances (m,) [m] to this one, and the reverse."""
+        """Points (m, 3) [m] on the true surface and their distances (m,) [m] from this one, and the reverse."""
         points, facets = with_middles(self.shape, self.points, self.triangles, self.regions, self.curved)
         places = along_facets(points, facets)[0].reshape(len(facets), -1, 3)
         ahead, behind = self.gaps.measure(places, lattice()[1])
         return (self.truth[0], ahead), (places.reshape(-1, 3), behind.ravel())
 
     def grow(self, nodes: int) -> None:
-        """Adds nodes until there are `nodes`, or until none of the farthest places takes one."""
+        """Adds nodes until there are `nodes`, or until a round adds none."""
         batch = max(1, (nodes - len(self.points)) // ROUNDS)
         while len(self.points) < nodes and self.add(min(batch, nodes - len(self.points))):
             pass
 
     def add(self, count: int) -> int:
-        """Adds up to `count` nodes where the surface is farthest from its shape, far from each other; how many."""
+        """Adds up to `count` nodes, far from each other, where the surface is farthest from its shape.
+
+        Returns how many.
+        """
         (samples, ahead), (places, behind) = self.distances()
         targets, away = np.concatenate([samples, places]), np.concatenate([ahead, behind])
         edges = unique_edges(self.triangles)
@@ -131,14 +134,17 @@ class Fit:
             target = targets[left[0]]
             grown = self.add_near(target, on_shape=left[0] < len(samples))
             added += grown
-            # Where no node could be added, no neighbour takes one; where one was, the distances around it have changed.
+            # Near a failed point others fail too; near a new node the distances have changed.
             reach = apart if grown else apart / 8.0
             left = left[np.linalg.norm(targets[left] - target, axis=1) > reach]
         return added
 
     def add_near(self, target: np.ndarray, on_shape: bool) -> bool:
-        """Splits an edge near `target` (3,) [m], the new node there if that is `on_shape`, else above the middle of the
-        edge; whether one could be split without spoiling a triangle."""
+        """Splits an edge near `target` (3,) [m]; returns whether one could be split without spoiling a triangle.
+
+        on_shape: whether the target lies on the true surface; the new node is then tried there first. Else, and on an
+        outline, it is the middle of the edge, projected onto f = 0.
+        """
         near = np.argsort(np.linalg.norm(self.points - target, axis=1))[:6]
         edges = unique_edges(self.triangles[np.isin(self.triangles, near).any(axis=1)])
         middles = places_on(self.shape, self.points, edges, self.outlines, self.regions)
@@ -150,8 +156,8 @@ class Fit:
         return False
 
     def fill_outlines(self, nodes: int) -> None:
-        """Splits the longest edges of outlines until they have FEWEST_AT_OUTLINE, twice as many where the area of the
-        region asks for it, as long as there are fewer than `nodes` nodes in all."""
+        """Splits the longest edges of each outline until it has FEWEST_AT_OUTLINE edges, or twice as many if the area
+        error of its region is over AREA, as long as there are fewer than `nodes` nodes in all."""
         for region in self.regions:
             alone = Fit(self.shape, self.surface, [region], self.truth, self.curved)
             fewest = FEWEST_AT_OUTLINE * (2 if alone.area_error() > AREA else 1)
@@ -165,7 +171,7 @@ class Fit:
             pass
 
     def split_first(self, edges: np.ndarray) -> bool:
-        """Splits the longest of the edges (e, 2) that allows it, those of outlines on their curve."""
+        """Splits the longest of the edges (e, 2) that allows it, an edge of an outline on its curve; False if none."""
         length = np.linalg.norm(np.diff(self.points[edges], axis=1)[:, 0], axis=1)
         for edge in edges[np.argsort(-length, kind="stable")]:
             place = places_on(self.shape, self.points, edge[None], self.outlines, self.regions)[0]
@@ -183,7 +189,10 @@ class Fit:
         return self.points, self.triangles
 
     def split(self, edge: np.ndarray, place: np.ndarray, on_outline: bool) -> bool:
-        """Splits an edge at a place (3,) [m] on f = 0, then turns edges around it; whether that spoils no triangle."""
+        """Splits an edge at a point `place` (3,) [m] on f = 0, then flips edges around it.
+
+        Returns False and changes nothing if that spoils a triangle or crosses an outline.
+        """
         count = len(self.points)
         points, triangles = split_edge(self.points, self.triangles, edge)
         points[-1] = place
@@ -193,7 +202,7 @@ class Fit:
         ring = unique_edges(around)
         ring = ring[[(row != count).all() and not self.is_outline(row) for row in ring]]
         triangles = flip_edges(points, triangles, ring, lambda k, m: True, 1.0)
-        # None is left where all four were turned; those that a turn made are better than the ones before it.
+        # None is left if all four were flipped; triangles that a flip made are better than those before it.
         around = np.isin(triangles, around).sum(axis=1) == 3
         worst = triangle_radius_ratio(points, triangles[around]).min(initial=np.inf)
         if worst < FLOOR or folds(points, triangles, count):
@@ -208,7 +217,7 @@ class Fit:
         return bool((edge == self.outlines).all(axis=1).any())
 
     def crosses(self, points: np.ndarray, triangles: np.ndarray, node: int) -> bool:
-        """Whether a new node lies on another side of a region's outline than its neighbours."""
+        """Whether a new node lies on the outline of a region, or on another side of it than one of its neighbours."""
         ring = np.unique(triangles[(triangles == node).any(axis=1)])
         sides = [region_side(region, points[ring]) for region in self.regions]
         own = ring == node
@@ -216,7 +225,7 @@ class Fit:
 
 
 def folds(points: np.ndarray, triangles: np.ndarray, node: int) -> bool:
-    """Whether neighbouring triangles around a node meet at an angle sharper than SHARPEST allows."""
+    """Whether the normals of two neighbours among the triangles around a node have a cosine below SHARPEST."""
     near = triangles[np.isin(triangles, triangles[(triangles == node).any(axis=1)]).any(axis=1)]
     normals = triangle_normals(points, near)
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)

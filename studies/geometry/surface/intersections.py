@@ -1,4 +1,4 @@
-"""Where a triangulation meets itself away from its shared nodes and edges. Decisions are exact (predicates)."""
+"""Finds where a triangulation meets itself apart from shared nodes and edges. Decisions are exact (predicates.py)."""
 
 import numpy as np
 
@@ -6,14 +6,14 @@ from studies.geometry.surface.boxes import overlapping_boxes
 from studies.geometry.surface.predicates import orientation, orientation_2
 
 CLEAR = 1e-9
-"""Relative distance from a separating plane at which rounding does not matter; nearer than that decisions are exact."""
+"""Relative distance from a separating plane beyond which rounding does not matter; nearer, decisions are exact."""
 
 
 def crossing_triangles(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Pairs (c, 2) of triangles (t, 3) on points (n, 3) that have more in common than their shared nodes.
+    """Pairs (c, 2) of triangles (t, 3) on points (n, 3) that have more points in common than shared nodes and edges.
 
-    Touching counts, and so do neighbours folded flat onto each other. Triangles with the same three nodes are
-    duplicates, not crossings; those with a repeated node are left out.
+    Touching counts, and so do neighbours that are folded flat onto each other. Triangles with the same three nodes are
+    duplicates, not crossings; triangles with a repeated node are left out.
     """
     proper = (triangles != np.roll(triangles, 1, axis=1)).all(axis=1)
     numbers = np.flatnonzero(proper)
@@ -25,7 +25,7 @@ def crossing_triangles(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
 
 
 def crossing(points: np.ndarray, triangles: np.ndarray, pairs: np.ndarray) -> np.ndarray:
-    """Those of the pairs (p, 2) that cross."""
+    """Those of the pairs (p, 2) of triangles (t, 3) that cross, (c, 2)."""
     one, other = triangles[pairs[:, 0]], triangles[pairs[:, 1]]
     same = one[:, :, None] == other[:, None, :]
     shared = same.sum(axis=(1, 2))
@@ -33,7 +33,7 @@ def crossing(points: np.ndarray, triangles: np.ndarray, pairs: np.ndarray) -> np
     for count, test in ((0, apart_cross), (1, fan_cross), (2, fold_cross)):
         rows = np.flatnonzero(shared == count)
         if len(rows):
-            # Shared nodes first, in both.
+            # Shared nodes come first in both triangles.
             a = shared_first(one[rows], same[rows].any(axis=2))
             b = shared_first(other[rows], same[rows].any(axis=1))
             crosses[rows] = test(points[a], points[b])
@@ -41,7 +41,7 @@ def crossing(points: np.ndarray, triangles: np.ndarray, pairs: np.ndarray) -> np
 
 
 def shared_first(triangles: np.ndarray, shared: np.ndarray) -> np.ndarray:
-    """The triangles (n, 3) with their shared corners in front; these are in the order of their node numbers."""
+    """The triangles (n, 3) with their shared corners first, in the order of their node numbers; shared (n, 3) bool."""
     keys = np.where(shared, triangles, triangles.max() + 1 + np.arange(3))
     return np.take_along_axis(triangles, np.argsort(keys, axis=1), axis=1)
 
@@ -62,7 +62,7 @@ def fan_cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Whether triangles (n, 3, 3) with a common first corner meet elsewhere too."""
     u, v = unit(a[:, 1:] - a[:, :1]), unit(b[:, 1:] - b[:, :1])
     between = (u.sum(axis=1) - v.sum(axis=1))[:, None, :]
-    # A plane through the common corner with one triangle on either side.
+    # A plane through the common corner with one triangle on each side.
     least, most = dot(u, between).min(axis=1), dot(v, between).max(axis=1)
     maybe = np.flatnonzero((least <= CLEAR) | (most >= -CLEAR))
     crosses, a, b = np.zeros(len(a), bool), a[maybe], b[maybe]
@@ -103,7 +103,7 @@ def segment_meets(p: np.ndarray, q: np.ndarray, triangle: np.ndarray) -> np.ndar
 
 
 def segment_meets_flat(p: np.ndarray, q: np.ndarray, triangle: np.ndarray) -> np.ndarray:
-    """The same where the segment lies in the plane of the triangle: seen along its largest axis, in two dimensions."""
+    """The same for segments in the plane of the triangle, projected along the largest component of its normal."""
     keep = np.argsort(np.abs(normal(triangle)), axis=1)[:, :2]
     p, q = np.take_along_axis(p, keep, axis=1), np.take_along_axis(q, keep, axis=1)
     corners = np.take_along_axis(triangle, keep[:, None, :], axis=2)
@@ -117,7 +117,7 @@ def segment_meets_flat(p: np.ndarray, q: np.ndarray, triangle: np.ndarray) -> np
 
 
 def boxes_meet(p: np.ndarray, q: np.ndarray, s: np.ndarray, t: np.ndarray) -> np.ndarray:
-    """Whether the boxes of segments p, q and s, t (n, 2) touch: what decides for segments on one line."""
+    """Whether the boxes of segments p, q and s, t (n, 2) touch, which decides for segments on one line."""
     low, high = np.minimum(p, q), np.maximum(p, q)
     touch = (low <= np.maximum(s, t)) & (np.minimum(s, t) <= high)
     return touch[:, 0] & touch[:, 1]
@@ -129,7 +129,7 @@ def dot(u: np.ndarray, v: np.ndarray) -> np.ndarray:
 
 
 def unit(u: np.ndarray) -> np.ndarray:
-    """Vectors of length 1 along the last axis; zero stays zero."""
+    """Vectors scaled to length 1 along the last axis; zero stays zero."""
     return u / np.maximum(np.linalg.norm(u, axis=-1, keepdims=True), 1e-300)
 
 

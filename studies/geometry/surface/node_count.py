@@ -1,4 +1,4 @@
-"""Meshing a surface with a wanted number of nodes."""
+"""Meshes a surface with a given number of nodes."""
 
 from collections.abc import Callable
 
@@ -13,23 +13,23 @@ from studies.geometry.surface.edit import with_node_count
 Surface = tuple[np.ndarray, np.ndarray]
 
 TOLERANCE = 0.02
-"""Relative deviation from the wanted node count that single-node edits may have to make up (or 5 nodes)."""
+"""Largest relative deviation from the node count that edits of single nodes correct (or 5 nodes)."""
 CLOSE = 0.005
-"""Deviation at which the search stops; so few edits leave no trace in the quality."""
+"""Relative deviation at which the search stops: so few edits do not reduce the quality."""
 FEWEST, MOST = 60, 20_000
 TRIES = 12
 QUALITY = 0.2
-"""Smallest radius ratio of a triangle that is accepted; below it the fill has slivers with any optimiser."""
+"""Smallest radius ratio of a triangle; below it the fill has slivers with any optimiser."""
 
 
 def surface_with(
     nodes: int, area: float, mesh_at: Callable[[float], Surface], shape: Shape, handles: int = 0
 ) -> Surface:
-    """A good closed surface on f = 0 with exactly `nodes` nodes, or within TOLERANCE where single edits cannot do it.
+    """A good closed surface on f = 0 with exactly `nodes` nodes, or within TOLERANCE or 5 if single edits fail.
 
-    nodes: wanted number; area: of the true surface [m^2]; mesh_at(size [m]) -> points, triangles of edges of that size;
-    handles: that the surface has, as a ring has one.
-    Raises StudyError when no try within TOLERANCE is closed, unfolded and well shaped.
+    area: of the true surface [m^2]; mesh_at: edge length [m] -> points (n, 3) [m] and triangles (t, 3); handles: number
+    that the surface has to have; a ring has one. Raises StudyError for `nodes` outside FEWEST to MOST, and if no try is
+    one outward sheet without slivers.
     """
     if not FEWEST <= nodes <= MOST:
         raise StudyError(f"{shape.name}: {nodes} surface nodes asked for, but the mesher offers {FEWEST} to {MOST}")
@@ -45,7 +45,7 @@ def surface_with(
                 candidates.append((miss, surface))
                 if miss <= CLOSE and len(edited) == nodes:
                     break
-        # N ~ size^-2; the slight overshoot that alternates keeps the search from standing still on one bad mesh.
+        # N ~ size^-2; a small alternating overshoot keeps the search from repeating one bad mesh.
         size *= (len(points) / nodes) ** 0.5 * (1.0 + 0.005 * (-1) ** attempt * (attempt // 2))
     if not candidates:
         raise StudyError(
@@ -56,12 +56,12 @@ def surface_with(
 
 
 def is_good(points: np.ndarray, triangles: np.ndarray, handles: int = 0) -> bool:
-    """Whether a surface is one closed sheet, outward, with so many handles and without slivers."""
+    """Whether a closed surface is outward and has so many handles and no slivers."""
     if handles_of(points, triangles) != handles or signed_volume(points, triangles) <= 0:
         return False
     return bool(triangle_radius_ratio(points, triangles).min() > QUALITY)
 
 
 def handles_of(points: np.ndarray, triangles: np.ndarray) -> int:
-    """Handles of a closed sheet on points (n, 3) that are all used: 1 - (V - E + F) / 2."""
+    """Number of handles of a connected closed surface of points (n, 3), all used: 1 - (V - E + F) / 2."""
     return 1 - (len(points) - len(unique_edges(triangles)) + len(triangles)) // 2

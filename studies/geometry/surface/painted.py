@@ -1,5 +1,4 @@
-"""A region painted on the nodes of a surface, represented by few samples, so that it is the same part of space for
-every mesh."""
+"""A region painted on the nodes of a surface, represented by few samples: the same part of space for every mesh."""
 
 import numpy as np
 from scipy.spatial import KDTree
@@ -10,15 +9,18 @@ from studies.geometry.mesh.wall_layers import mean_edge
 from studies.geometry.shape.regions import PaintedRegion
 
 WIDTH = 0.75
-"""Width of the Gaussian that smooths the border, over the mean edge there: it removes the steps from node to node."""
+"""Standard deviation of the Gaussian that smooths the border, over the mean edge there; it removes the steps from node
+to node."""
 SPARSE = 0.4
-"""Distance between samples over that to the border: below 1/2 the nearest sample is always on the correct side."""
+"""Distance between samples over their distance to the border; below 1/2 the nearest sample is always on the correct
+side."""
 
 
 def painted_region(points: np.ndarray, triangles: np.ndarray, inside: np.ndarray, name: str) -> PaintedRegion:
-    """The region of the nodes `inside` (n,) bool of a surface, points (n, 3) [m], triangles (t, 3).
+    """The region of the nodes `inside` (n,) bool of a surface of points (n, 3) [m] and triangles (t, 3).
 
-    The border runs half way between nodes inside and outside. Raises StudyError where there is no border.
+    The border runs half way between nodes inside and outside. Samples are rounded to 1 µm. name: for the message.
+    Raises StudyError if all nodes are inside, or all outside.
     """
     used = np.unique(triangles)
     if len(np.unique(inside[used])) != 2:
@@ -39,8 +41,8 @@ def painted_region(points: np.ndarray, triangles: np.ndarray, inside: np.ndarray
 
 
 def thinned(points: np.ndarray, areas: np.ndarray, away: np.ndarray) -> np.ndarray:
-    """Rows x, y, z [m], area [m²] of a part of the points (n, 3), as dense as their distance `away` (n,) [m] to the
-    other side requires; each with the area of the points that it represents."""
+    """Samples x, y, z [m] and area [m²] of points (n, 3), shape (s, 4), as dense as their distance `away` (n,) [m] from
+    the other side requires; each has the area of the points that it represents."""
     tree, left, rows = KDTree(points), np.ones(len(points), bool), []
     for i in np.argsort(-away):
         if left[i]:

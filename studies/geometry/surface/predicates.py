@@ -1,17 +1,18 @@
-"""Exact decisions on which side a point lies: floating point first, integers if its error bound is not sufficient."""
+"""Exact decisions on which side a point lies: floating point first, integers where its error bound does not suffice."""
 
 from collections.abc import Callable, Sequence
 
 import numpy as np
 
 BOUND_3, BOUND_2 = 7.8e-16, 3.4e-16
-"""Relative to the sum of the moduli of the products: more than the rounding of the determinants can be (Shewchuk 1997,
-Adaptive precision floating-point arithmetic and fast robust geometric predicates, bounds A)."""
+"""Upper bounds of the rounding of the determinants in three and two dimensions, relative to the sum of the absolute
+values of the products (Shewchuk 1997, Adaptive precision floating-point arithmetic and fast robust geometric
+predicates, bounds A)."""
 
 
 def orientation(a: np.ndarray, b: np.ndarray, c: np.ndarray, d: np.ndarray) -> np.ndarray:
-    """Sign of det(a - d, b - d, c - d), shape (n,) int, for points (n, 3): 1 where d lies under a, b, c seen
-    anticlockwise from above, 0 exactly in their plane."""
+    """Sign of det(a - d, b - d, c - d), shape (n,) int, for points (n, 3): 1 if d lies below the plane of a, b, c,
+    which are anticlockwise seen from above, and 0 exactly in the plane."""
     u, v, w = a - d, b - d, c - d
     positive = [u[:, i] * v[:, j] * w[:, k] for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1))]
     negative = [u[:, i] * v[:, j] * w[:, k] for i, j, k in ((2, 1, 0), (1, 0, 2), (0, 2, 1))]
@@ -20,7 +21,7 @@ def orientation(a: np.ndarray, b: np.ndarray, c: np.ndarray, d: np.ndarray) -> n
 
 
 def orientation_2(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> np.ndarray:
-    """Sign of det(a - c, b - c), shape (n,) int, for points (n, 2): 1 where a, b, c turn anticlockwise."""
+    """Sign of det(a - c, b - c), shape (n,) int, for points (n, 2): 1 if a, b, c are anticlockwise."""
     u, v = a - c, b - c
     products = [u[:, 0] * v[:, 1], u[:, 1] * v[:, 0]]
     return decided(products[0] - products[1], BOUND_2, products, (a, b, c), exact_2)
@@ -33,7 +34,7 @@ def decided(
     corners: Sequence[np.ndarray],
     exact: Callable[..., np.ndarray],
 ) -> np.ndarray:
-    """Signs of `value` (n,) where it exceeds its rounding, and exact ones elsewhere."""
+    """Signs of the determinants `value` (n,), decided by `exact` where twice the rounding error may exceed them."""
     doubtful = np.abs(value) < 2.0 * bound * sum(np.abs(product) for product in products)
     sign = np.sign(value).astype(int)
     if doubtful.any():
@@ -42,7 +43,7 @@ def decided(
 
 
 def whole_numbers(arrays: list[np.ndarray]) -> list[np.ndarray]:
-    """The same coordinates as Python integers, all times one power of two."""
+    """The coordinates as Python integers, all multiplied by the same power of two."""
     parts = [np.frexp(array) for array in arrays]
     least = min(int(exponent.min()) for _, exponent in parts)
     scaled = []

@@ -1,4 +1,4 @@
-"""Repairs that need no guessing: doubled and flat triangles, parts, orientation, small holes."""
+"""Repairs that need no guess: duplicate and collapsed triangles, parts, orientation, holes."""
 
 from dataclasses import dataclass
 
@@ -25,11 +25,12 @@ class RepairedSurface:
 
 
 def mend(points: np.ndarray, triangles: np.ndarray, name: str, holes: bool = False) -> RepairedSurface:
-    """The largest part of a welded surface, points (n, 3) [m], triangles (t, 3), oriented outward.
+    """The largest part of a welded surface of points (n, 3) [m] and triangles (t, 3), oriented outward.
 
-    Triangles given twice or without three different corners go; parts other than the largest go; triangles are turned
-    to agree with their neighbours and to look outward; `holes`: borders are closed by a fan over their middle.
-    Raises StudyError when nothing is left, or for a surface with one side only.
+    Removes duplicate triangles, those without three different corners, and all parts except the largest. Flips
+    triangles to agree with their neighbours and to look outward. holes: whether each border is closed by a fan of
+    triangles over the mean of its nodes. name: for messages. Raises StudyError if nothing is left, or for a surface
+    with one side only.
     """
     remarks: list[str] = []
     whole = len(triangles)
@@ -60,7 +61,7 @@ def mend(points: np.ndarray, triangles: np.ndarray, name: str, holes: bool = Fal
 
 
 def without_repeats(triangles: np.ndarray) -> np.ndarray:
-    """The triangles with three different corners, each set of corners once, in their order."""
+    """The triangles with three different corners, each set of corners once, in the given order."""
     rows = np.sort(triangles, axis=1)
     sound = np.flatnonzero((rows[:, 1:] != rows[:, :-1]).all(axis=1))
     _, first = np.unique(rows[sound], axis=0, return_index=True)
@@ -68,7 +69,7 @@ def without_repeats(triangles: np.ndarray) -> np.ndarray:
 
 
 def edge_pairs(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Triangles that share an edge, as pairs (e, 2), and whether they run along it in opposite directions (e,).
+    """Pairs (e, 2) of triangles that share an edge, and whether they run along it in opposite directions, (e,) bool.
 
     At an edge with more than two triangles each is paired with the next.
     """
@@ -81,7 +82,7 @@ def edge_pairs(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def part_of(triangles: np.ndarray) -> np.ndarray:
-    """Number of the part of each triangle (t,); parts hang together by edges."""
+    """Number of the part of each triangle, (t,); triangles of a part are connected by edges."""
     pairs, _ = edge_pairs(triangles)
     count = len(triangles)
     graph = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(count, count))
@@ -89,7 +90,7 @@ def part_of(triangles: np.ndarray) -> np.ndarray:
 
 
 def largest(points: np.ndarray, triangles: np.ndarray, parts: np.ndarray) -> int:
-    """Number of the part with the largest bounding box: an outer surface, never its lumen."""
+    """Number of the part with the largest bounding box, which is an outer surface and never its lumen."""
     sizes = [
         float(np.linalg.norm(np.ptp(points[triangles[parts == k]].reshape(-1, 3), axis=0))) for k in np.unique(parts)
     ]
@@ -97,7 +98,7 @@ def largest(points: np.ndarray, triangles: np.ndarray, parts: np.ndarray) -> int
 
 
 def largest_part(points: np.ndarray, triangles: np.ndarray) -> Surface:
-    """The part with the largest bounding box alone, without the points of the others."""
+    """The part with the largest bounding box: its points (m, 3) and triangles (s, 3)."""
     parts = part_of(triangles)
     kept = triangles[parts == largest(points, triangles, parts)]
     used, renumbered = np.unique(kept, return_inverse=True)
@@ -105,10 +106,10 @@ def largest_part(points: np.ndarray, triangles: np.ndarray) -> Surface:
 
 
 def oriented(triangles: np.ndarray, name: str) -> tuple[np.ndarray, int]:
-    """Triangles (t, 3) of one part turned to agree with the majority, and how many were turned.
+    """Triangles (t, 3) of one part, consistently oriented like the majority, and how many were flipped.
 
-    Every triangle stands twice in a graph, as it is and turned; neighbours are joined where they agree. The surface has
-    two sides when that graph falls in two; raises StudyError when it does not (a Moebius band).
+    A graph contains every triangle twice, as it is and flipped, and joins neighbours that agree. The surface has two
+    sides if this graph has two parts; if not (a Moebius band), StudyError is raised.
     """
     pairs, opposite = edge_pairs(triangles)
     count = len(triangles)
@@ -127,7 +128,7 @@ def oriented(triangles: np.ndarray, name: str) -> tuple[np.ndarray, int]:
 
 
 def border(triangles: np.ndarray) -> np.ndarray:
-    """Half edges (b, 2) that no triangle runs along the other way."""
+    """Half edges (b, 2) of triangles (t, 3) along which no triangle runs in the other direction."""
     half = triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
     size = int(triangles.max()) + 1
     forward, backward = half[:, 0] * size + half[:, 1], half[:, 1] * size + half[:, 0]
@@ -135,7 +136,7 @@ def border(triangles: np.ndarray) -> np.ndarray:
 
 
 def without_holes(points: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:
-    """Every border closed by a fan over the mean of its nodes: points, triangles, number of holes."""
+    """Closes every connected border by a fan over the mean of its nodes: points, triangles, number of holes."""
     open_edges = border(triangles)
     if not len(open_edges):
         return points, triangles, 0
@@ -149,5 +150,5 @@ def without_holes(points: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray
 
 
 def flat_triangles(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Numbers of the triangles without a usable normal."""
+    """Indices of the triangles whose radius ratio is below SLIVER, so that their normal is unusable."""
     return np.flatnonzero(triangle_radius_ratio(points, triangles) < SLIVER)

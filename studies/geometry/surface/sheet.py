@@ -1,4 +1,4 @@
-"""A plane through a closed surface before it is meshed: the trace, the pieces it would leave, and whether it can be."""
+"""The section of a closed surface by a plane, before meshing: its trace, the pieces that it leaves, and its checks."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -15,10 +15,10 @@ from studies.geometry.mesh.organ_mesh import triangle_normals
 from studies.geometry.shape.regions import BallRegion, HalfSpace, Region
 
 LEAST_PIECE = 0.01
-"""Smallest share of the volume of a separate piece."""
+"""Smallest share of the volume that a separate piece may have."""
 GRAZING = 15.0
-"""Degrees between plane and surface below which no element of the edge between them is well shaped: flat sides differ
-from the surface by some degrees, and meshes of 8 are refused."""
+"""Angle between plane and surface [degrees] below which no element at the edge between them is well shaped: flat sides
+differ from the surface by some degrees, and dihedral angles below 8 are refused."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,32 +26,33 @@ class Piece:
     """A connected piece of the body on one side of a plane."""
 
     surface: np.ndarray
-    """Places on its part of the surface [m], (n, 3)."""
+    """Points on its part of the surface and on the trace [m], (n, 3)."""
     share: float
-    """Share of the whole volume."""
+    """Share of the whole volume [1]."""
 
 
 @dataclass(frozen=True, eq=False)
 class Sheet:
-    """A closed surface along a plane."""
+    """The section of a closed surface by a plane."""
 
     trace: np.ndarray
-    """Ends of the straight parts of the outline of the section [m], (e, 2, 3)."""
+    """Ends of the segments of the outline of the section [m], (e, 2, 3)."""
     angles: np.ndarray
-    """Angle between the plane and the surface at each part of the outline [degrees], (e,)."""
+    """Angle between the plane and the surface at each segment [degrees], 0 to 90, (e,)."""
     crossed: np.ndarray
-    """Whether each triangle of the surface has corners on both sides, (t,)."""
+    """Whether each triangle of the surface has corners on both sides, (t,) bool."""
     pieces: list[Piece]
 
 
 def sheet_of(plane: HalfSpace, points: np.ndarray, triangles: np.ndarray) -> Sheet:
-    """The section of a closed surface of `triangles` (t, 3) by a plane, and the pieces on either side."""
+    """The section of a closed surface of points (n, 3) [m] and triangles (t, 3) by a plane, and the pieces on both
+    sides."""
     level = plane.level(points)
     front = level > 0
     count = front[triangles].sum(axis=1)
     crossed = (count == 1) | (count == 2)
     mixed = triangles[crossed]
-    # The corner that is alone on its side first.
+    # The corner that is alone on its side comes first.
     alone = front[mixed] == (count[crossed] == 1)[:, None]
     lone, one, other = np.take_along_axis(mixed, (alone.argmax(axis=1)[:, None] + np.arange(3)) % 3, axis=1).T
     ends = np.sort(np.concatenate([np.stack([lone, one], axis=1), np.stack([lone, other], axis=1)]), axis=1)
@@ -76,15 +77,15 @@ def sheet_of(plane: HalfSpace, points: np.ndarray, triangles: np.ndarray) -> She
 
 
 def _pieces(points: np.ndarray, triangles: np.ndarray, plane: HalfSpace) -> list[tuple[np.ndarray, float]]:
-    """Nodes and volume [m³] of each piece of what lies on one side of a plane, triangles (t, 3) and their section."""
+    """Nodes and volume [m³] of each piece on one side of a plane, bounded by triangles (t, 3) and their section."""
     pairs = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]]])
     graph = coo_array((np.ones(len(pairs)), pairs.T), shape=(len(points), len(points)))
     label = connected_components(graph, directed=False)[1][triangles[:, 0]]
-    # Relative to a point of the plane the section adds no volume.
+    # With the origin in the plane the section contributes no volume.
     a, b, c = (points - np.asarray(plane.point))[triangles].transpose(1, 0, 2)
     volume = np.einsum("ij,ij->i", a, np.cross(b, c)) / 6.0
     pieces = [(np.unique(triangles[label == k]), float(volume[label == k].sum())) for k in np.unique(label)]
-    # A dent of the surface is not a piece: its volume is missing in the largest piece.
+    # A part with negative volume is a dent: its volume is subtracted from the largest piece.
     dents = sum(volume for _, volume in pieces if volume <= 0)
     pieces = sorted((piece for piece in pieces if piece[1] > 0), key=lambda piece: -piece[1])
     return [(nodes, volume + (dents if k == 0 else 0.0)) for k, (nodes, volume) in enumerate(pieces)]
@@ -98,8 +99,11 @@ def check_sheet(
     within: Region | None,
     held: Iterable[Region],
 ) -> Sheet:
-    """The sheet of a cut called `cut` through the closed surface of the organ or scene `name`, its blade `within` and
-    its `held` regions. Raises StudyError for one that no mesh can have."""
+    """The section of the closed surface of the organ or scene `name` by the plane of the cut called `cut`.
+
+    within: the blade; held: regions whose outlines the cut must not cross. Raises StudyError for a plane that misses or
+    grazes the surface, crosses such an outline, or leaves too small a piece, and for a blade that does not fit.
+    """
     points, triangles = surface
     sheet = sheet_of(plane, points, triangles)
     if not len(sheet.trace):
@@ -125,7 +129,10 @@ def check_sheet(
 
 def check_apart(name: str, sheets: Mapping[str, tuple[HalfSpace, Sheet]], edge: float = 0.0) -> None:
     """Raises StudyError for two cuts of the organ or scene `name` whose sections meet, or whose outlines are less than
-    an `edge` [m] apart; `sheets`: the plane of each cut by name, and what it does to the surface."""
+    an `edge` [m] apart.
+
+    sheets: name of each cut -> its plane and its section of the surface.
+    """
     for (one, (plane, first)), (other, (_, second)) in combinations(sheets.items(), 2):
         level = plane.level(second.trace.reshape(-1, 3)).reshape(-1, 2)
         # Inside the body the planes meet along a line, and where it leaves the body an outline crosses the other plane.

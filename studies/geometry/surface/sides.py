@@ -1,4 +1,4 @@
-"""The sides of a surface mesh: straight, or quadratic with mid-side nodes on the true surface."""
+"""The facets of a surface mesh: flat, or quadratic with mid-side nodes on the true surface."""
 
 from collections.abc import Sequence
 from functools import cache
@@ -10,23 +10,26 @@ from studies.geometry.shape.levelset import Shape, project
 from studies.geometry.shape.regions import Region
 
 PARTS = 4
-"""Divisions of each side of a facet for measuring distances: 15 points per facet."""
+"""Parts of each side of a facet for measuring distances: 15 points per facet."""
 OUTLINE = 1e-9
-"""Distance [m] within which a node is on an outline, far above rounding and far below an edge."""
+"""Level [m] within which a node is on an outline: far above rounding and far below an edge."""
 
 
 def region_side(region: Region, points: np.ndarray) -> np.ndarray:
-    """-1 inside the region, 1 outside, 0 on its outline, (n,), of points (n, 3) [m] of a whole surface or near one."""
+    """Side (n,) of points (n, 3) [m]: -1 inside the region, 1 outside, 0 on its outline."""
     level = region.level(points)
     return np.sign(np.where(np.abs(level) <= OUTLINE, 0.0, level))
 
 
 def region_area(region: Region, points: np.ndarray, triangles: np.ndarray) -> float:
-    """Area [m²] of a surface, points (n, 3) [m] and triangles (t, 3), inside the region, its level linear on each."""
+    """Area [m²] inside the region of a surface of points (n, 3) [m] and triangles (t, 3).
+
+    The level of the region is interpolated linearly on each triangle.
+    """
     level = np.sort(region.level(points)[triangles], axis=1)
     low, middle, high = level.T
     with np.errstate(invalid="ignore", divide="ignore"):
-        # A corner alone on its side cuts off a triangle that is similar along both of its edges.
+        # A corner that is alone on its side cuts off a triangle, with a share of both edges at that corner.
         below = low**2 / ((middle - low) * (high - low))
         above = high**2 / ((high - low) * (high - middle))
     share = np.where(high <= 0, 1.0, np.where(low >= 0, 0.0, np.where(middle >= 0, below, 1.0 - above)))
@@ -34,7 +37,7 @@ def region_area(region: Region, points: np.ndarray, triangles: np.ndarray) -> fl
 
 
 def outline_edges(points: np.ndarray, triangles: np.ndarray, region: Region) -> np.ndarray:
-    """Edges (e, 2), lower index first, between a triangle (t, 3) inside the region and one outside."""
+    """Edges (e, 2), lower index first, between one of the triangles (t, 3) inside the region and one outside."""
     inside = (region_side(region, points) <= 0)[triangles].all(axis=1)
     half = np.sort(triangles[inside][:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
     edges, count = np.unique(half, axis=0, return_counts=True)
@@ -44,7 +47,7 @@ def outline_edges(points: np.ndarray, triangles: np.ndarray, region: Region) -> 
 def places_on(
     shape: Shape, points: np.ndarray, edges: np.ndarray, outlines: np.ndarray, regions: Sequence[Region]
 ) -> np.ndarray:
-    """The middles of edges (e, 2), brought onto f = 0, those of `outlines` (o, 2) onto the curve too, (e, 3) [m]."""
+    """The middles (e, 3) [m] of edges (e, 2), projected onto f = 0; those of `outlines` (o, 2) stay on the curve."""
     middles = points[edges].mean(axis=1)
     on = np.zeros(len(edges), bool)
     if len(outlines):
@@ -59,8 +62,11 @@ def places_on(
 def with_middles(
     shape: Shape, points: np.ndarray, triangles: np.ndarray, regions: Sequence[Region], curved: bool
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Points and the middles of all edges (m, 3) [m], and facets (t, 6): corners, then the nodes between first and
-    second, second and third, third and first. curved: middles lie on f = 0 and on outlines; else half way."""
+    """Points followed by the mid-side nodes of all edges (m, 3) [m], and facets (t, 6): corners, then the nodes between
+    first and second, second and third, third and first corner.
+
+    curved: whether mid-side nodes are projected onto f = 0 and the outlines of `regions`; else they are midpoints.
+    """
     edges, count = unique_edges(triangles), len(points)
     middles = points[edges].mean(axis=1)
     if curved:
@@ -76,8 +82,8 @@ def with_middles(
 
 
 def along_facets(points: np.ndarray, facets: np.ndarray, parts: int = PARTS) -> tuple[np.ndarray, np.ndarray]:
-    """Places (m, 3) [m] evenly on flat facets (t, 3) or quadratic ones (t, 6), whose sides are cut into `parts`, and
-    the flat triangles (parts² t, 3) between them."""
+    """Evenly spread points (m, 3) [m] on flat facets (t, 3) or quadratic ones (t, 6), with sides divided into `parts`,
+    and the flat triangles (parts² t, 3) between them."""
     local, pieces = lattice(parts)
     places = np.einsum("pa,fai->fpi", shape_functions(local, facets.shape[1] == 6), points[facets])
     first = len(local) * np.arange(len(facets))

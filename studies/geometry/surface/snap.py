@@ -1,6 +1,6 @@
 """Attachments with the same outline on every mesh: nodes near the curve f = g = 0 are moved onto it.
 
-Without this a held patch is bounded by a staircase of facets; the force on it differed by 15 per cent between meshes.
+Without this a staircase of edges bounds a held patch, and the force on it differed by 15 % between meshes.
 """
 
 from collections.abc import Sequence
@@ -16,16 +16,18 @@ from studies.geometry.surface.edit import flip_edges
 from studies.geometry.surface.first_surface import neighbour_mean
 
 FLOORS = (0.35, 0.2, 0.1, 0.05)
-"""Smallest triangle radius ratio accepted in successive rounds: the good moves first, relaxation between rounds."""
+"""Smallest radius ratio of a triangle that a move may leave, in successive rounds: good moves come first."""
 POOR = 0.4
-"""Radius ratio of a triangle below which edges are turned to improve it."""
+"""Radius ratio of a triangle below which its edges are flipped to improve it."""
 
 
 def outlined(
     shape: Shape, points: np.ndarray, triangles: np.ndarray, regions: Sequence[Region], near: float = np.inf
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The surface with every region's outline on its edges; earlier outlines stay where they are, and so does what is
-    farther from an outline than `near` [m]."""
+    """The surface with the outline of every region on its edges. Raises StudyError if an outline does not fit.
+
+    Nodes of earlier outlines stay in place, and so do nodes with |level| over `near` [m].
+    """
     fixed = np.zeros(len(points), bool)
     for region in regions:
         far = np.abs(region.level(points)) > near
@@ -37,11 +39,11 @@ def outlined(
 def snap_region(
     shape: Shape, points: np.ndarray, triangles: np.ndarray, region: Region, fixed: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Move the nearer end of each edge that crosses level = 0 along the surface onto the curve.
+    """Moves the nearer end of each edge that crosses level = 0 along the surface onto the curve.
 
-    points (n, 3) [m] on f = 0; fixed (n,) bool, nodes that belong to another region's curve. An edge of which neither
-    end can go is turned in its quadrilateral. Returns the points, the triangles and the mask of nodes now on the curve.
-    Raises StudyError when edges still cross the curve at the end: the mesh is then too coarse for the region.
+    points (n, 3) [m] on f = 0; fixed (n,) bool: nodes that stay. An edge of which neither end can move is flipped in
+    its quadrilateral. Returns points, triangles, and the mask (n,) of nodes on the curve. Raises StudyError if edges
+    still cross the curve at the end, because the mesh is too coarse for the region.
     """
     tolerance = ON_CURVE * shape.size
     for floor in FLOORS:
@@ -65,7 +67,10 @@ def snap_region(
 def turn_edges(
     points: np.ndarray, triangles: np.ndarray, region: Region, fixed: np.ndarray, tolerance: float, floor: float
 ) -> np.ndarray:
-    """The triangles after turning edges that cross the curve, then those of poor triangles, none across a curve."""
+    """The triangles after flips of edges that cross the curve, then of edges of poor triangles.
+
+    No flip makes an edge that crosses the curve of `region`.
+    """
     level = region.level(points)
     side = np.sign(np.where(np.abs(level) <= tolerance, 0.0, level))
     crossing = crossing_edges(region, points, unique_edges(triangles), tolerance)
@@ -78,7 +83,7 @@ def turn_edges(
 
 
 def crossing_edges(region: Region, points: np.ndarray, edges: np.ndarray, tolerance: float) -> np.ndarray:
-    """Edges whose ends lie strictly on different sides, shape (c, 2)."""
+    """Those of the edges (e, 2) whose ends lie strictly on different sides of the curve, shape (c, 2)."""
     level = region.level(points)
     side = np.sign(np.where(np.abs(level) <= tolerance, 0.0, level))
     return edges[side[edges[:, 0]] * side[edges[:, 1]] < 0]
@@ -87,7 +92,7 @@ def crossing_edges(region: Region, points: np.ndarray, edges: np.ndarray, tolera
 def choose_ends(
     points: np.ndarray, crossing: np.ndarray, level: np.ndarray, fixed: np.ndarray, other: bool
 ) -> np.ndarray:
-    """For each crossing edge the nearer end (or the other one), unless fixed; each node once."""
+    """For each crossing edge (c, 2) the end nearer to the curve, or the `other` one, unless it is fixed; each once."""
     first_nearer = np.abs(level[crossing[:, 0]]) <= np.abs(level[crossing[:, 1]])
     column = np.where(first_nearer != other, 0, 1)
     chosen = np.unique(crossing[np.arange(len(crossing)), column])
@@ -97,7 +102,7 @@ def choose_ends(
 def move_to_curve(
     shape: Shape, points: np.ndarray, triangles: np.ndarray, region: Region, chosen: np.ndarray, floor: float
 ) -> np.ndarray:
-    """Points with the chosen nodes on the curve, except those whose move would spoil a triangle."""
+    """Points (n, 3) [m] with the chosen nodes moved onto the curve, except those whose move would spoil a triangle."""
     moved = points.copy()
     if len(chosen):
         moved[chosen] = project(shape, points[chosen], (region.level,))
@@ -105,9 +110,10 @@ def move_to_curve(
 
 
 def without_spoilers(before: np.ndarray, after: np.ndarray, triangles: np.ndarray, floor: float) -> np.ndarray:
-    """`after`, but with nodes put back, the farthest-moved of each bad triangle first, until no move spoils a triangle.
+    """`after` with the node of each bad triangle that moved farthest put back, until no triangle is bad.
 
-    Bad: the radius ratio falls below both `floor` and what it was, or the normal turns by over 60 degrees.
+    A triangle is bad if its radius ratio falls below both `floor` and its former value, or if its normal turns by more
+    than 60 degrees.
     """
     limit = np.minimum(floor, triangle_radius_ratio(before, triangles) - 1e-12)
     old_normals = triangle_normals(before, triangles)
@@ -134,10 +140,11 @@ def relax(
     fixed: np.ndarray,
     rounds: int = 4,
 ) -> np.ndarray:
-    """Even out the surface: nodes half way to their neighbours' mean and back onto f = 0, those on a curve along it.
+    """Points (n, 3) [m] after `rounds` of relaxation: each node moves half way to the mean of its neighbours and is
+    projected back onto f = 0; nodes on the curve of `region` stay on it.
 
-    Moves that make a triangle worse than it was and than 0.6 are taken back, so the worst triangle only improves.
-    Nodes do not change sides of the region.
+    on_curve, fixed (n,) bool; fixed nodes stay. Moves that make a triangle worse than before and than a radius ratio of
+    0.6 are taken back, so triangles below 0.6 never get worse. Nodes do not change sides of the region.
     """
     edges = unique_edges(triangles)
     curve = edges[on_curve[edges].all(axis=1)]

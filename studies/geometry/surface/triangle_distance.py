@@ -1,16 +1,19 @@
-"""The exact distance to triangles, of points and on a grid near them, compiled."""
+"""Exact distances of points and grid points to triangles, in compiled code."""
 
 import numpy as np
 
 from massspring.kernels.jit.decorators import compiled
 
 FLAT = 1e-20
-"""Squared sine of the angle at a corner under which a triangle is a line: its normal would be rounding."""
+"""Squared sine of the angle at the first corner below which a triangle is a line, whose normal would be rounding."""
 
 
 @compiled
 def squared_to_segment(w0: float, w1: float, w2: float, d0: float, d1: float, d2: float):
-    """|w - s d|² at the nearest s in [0, 1]: w from the start of the segment to the point, d along the segment."""
+    """Squared distance of a point to a segment, |w - s d|² at the nearest s in [0, 1].
+
+    w: from the start of the segment to the point; d: from its start to its end.
+    """
     length = d0 * d0 + d1 * d1 + d2 * d2
     along = w0 * d0 + w1 * d1 + w2 * d2
     s = min(max(along / length, 0.0), 1.0) if length > 0.0 else 0.0
@@ -22,13 +25,13 @@ def squared_to_segment(w0: float, w1: float, w2: float, d0: float, d1: float, d2
 def squared_to_triangle(p: np.ndarray, triangle: np.ndarray, u: np.ndarray, v: np.ndarray, n: np.ndarray):
     """Squared distance of the point p (3,) to a triangle (3, 3) with edges u, v from its first corner, n = u x v.
 
-    Over the face it is the height, (w·n)²/n², elsewhere the distance to the nearest edge: also of a triangle so flat
-    that its normal would be rounding.
+    Over the face it is (w·n)²/n², w from the first corner to p. Elsewhere, and for a triangle so flat that its normal
+    would be rounding, it is the squared distance to the nearest edge.
     """
     w0, w1, w2 = p[0] - triangle[0, 0], p[1] - triangle[0, 1], p[2] - triangle[0, 2]
     square = n[0] * n[0] + n[1] * n[1] + n[2] * n[2]
     if square > FLAT * (u[0] * u[0] + u[1] * u[1] + u[2] * u[2]) * (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]):
-        # Barycentric coordinates of the foot: s = (w x v)·n / n², t = (u x w)·n / n².
+        # Barycentric coordinates of the foot, times n²: s = (w x v)·n, t = (u x w)·n.
         s = (w1 * v[2] - w2 * v[1]) * n[0] + (w2 * v[0] - w0 * v[2]) * n[1] + (w0 * v[1] - w1 * v[0]) * n[2]
         t = (u[1] * w2 - u[2] * w1) * n[0] + (u[2] * w0 - u[0] * w2) * n[1] + (u[0] * w1 - u[1] * w0) * n[2]
         if s >= 0.0 and t >= 0.0 and s + t <= square:
@@ -43,7 +46,7 @@ def squared_to_triangle(p: np.ndarray, triangle: np.ndarray, u: np.ndarray, v: n
 
 @compiled
 def edges_into(triangle: np.ndarray, u: np.ndarray, v: np.ndarray, n: np.ndarray):
-    """Edges u, v (3,) from the first corner of a triangle (3, 3), and n = u x v; returns n²."""
+    """Writes the edges u, v (3,) from the first corner of a triangle (3, 3) and n = u x v; returns n²."""
     for k in range(3):
         u[k] = triangle[1, k] - triangle[0, k]
         v[k] = triangle[2, k] - triangle[0, k]
@@ -60,8 +63,8 @@ def nearest_into(
     squared: np.ndarray,
     nearest: np.ndarray,
 ):
-    """squared (q,): squared distance of each of `queries` (q, 3) to the nearest of its triangles `near` (q, k) among
-    corners (f, 3, 3), whose number is nearest (q,); scratch (3, 3)."""
+    """Writes into squared (q,) the squared distance of each of `queries` (q, 3) to the nearest of its triangles `near`
+    (q, k) among corners (f, 3, 3), and into nearest (q,) the index of that triangle; scratch (3, 3)."""
     u, v, n = scratch
     for q in range(len(queries)):
         squared[q] = np.inf
@@ -75,9 +78,10 @@ def nearest_into(
 
 @compiled
 def band_distance_into(corners: np.ndarray, reach: float, scratch: np.ndarray, squared: np.ndarray, owner: np.ndarray):
-    """Lower squared (a, b, c) to the squared distance to the triangles at grid points within `reach` of their boxes.
+    """Lowers squared (a, b, c) to the squared distance to the triangles, at grid points within `reach` of their boxes.
 
-    Lengths in cells from the first grid point. corners (t, 3, 3); scratch (4, 3); owner (a, b, c) gets the nearest one.
+    Lengths are in cells, coordinates relative to the first grid point. corners (t, 3, 3); scratch (4, 3); owner
+    (a, b, c) gets the index of the nearest triangle.
     """
     u, v, n, p = scratch
     for f in range(len(corners)):
@@ -101,7 +105,10 @@ def band_distance_into(corners: np.ndarray, reach: float, scratch: np.ndarray, s
 
 @compiled
 def far_distance_into(corners: np.ndarray, reach: float, owner: np.ndarray, scratch: np.ndarray, squared: np.ndarray):
-    """Lower squared (a, b, c) beyond `reach` to the squared distance to the triangle owner (a, b, c). In cells."""
+    """Lowers squared (a, b, c), where it is over reach², to the squared distance to the triangle owner (a, b, c).
+
+    Lengths are in cells. corners (t, 3, 3); scratch (4, 3).
+    """
     u, v, n, p = scratch
     for i in range(squared.shape[0]):
         for j in range(squared.shape[1]):
@@ -115,7 +122,7 @@ def far_distance_into(corners: np.ndarray, reach: float, owner: np.ndarray, scra
 
 @compiled
 def cells_between(coordinates: np.ndarray, reach: float, size: int):
-    """First grid row within `reach` of three coordinates, and the one after the last, inside [0, size)."""
+    """First grid row within `reach` of three coordinates, and the one after the last, limited to [0, size]."""
     low = min(coordinates[0], coordinates[1], coordinates[2]) - reach
     high = max(coordinates[0], coordinates[1], coordinates[2]) + reach
     return max(int(-(-low // 1)), 0), min(int(high // 1) + 1, size)

@@ -1,7 +1,7 @@
-"""Gives a surface mesh exactly the volume of its shape by moving its nodes slightly along the normals.
+"""Gives a surface mesh the volume of its shape by moving its nodes slightly along the normals.
 
 A polyhedron whose nodes lie on a round surface is too small, by 1 to 3 % at 550 nodes. Nodes move outward where the
-triangles around them cut off the shape, and inward where they bridge a hollow, so nodes remain as near to the shape as
+triangles around them lie inside the shape, and inward where they bridge a hollow, so nodes are as near to the shape as
 the triangles.
 """
 
@@ -23,25 +23,26 @@ from studies.geometry.shape.regions import ON_CURVE, Region
 from studies.geometry.surface.intersections import crossing_triangles
 
 EXACT, ENOUGH = 1e-6, 1e-4
-"""Relative deviation of the volume at which the search ends, and the largest that is accepted: a tenth of what is
-promised."""
+"""Relative deviation of the volume at which the search ends, and the largest that is accepted: a tenth of the promised
+one."""
 ROUNDS = 12
 FARTHEST = 0.25
-"""Largest motion of a node, over the mean edge around it."""
+"""Largest move of a node, over the mean edge at it."""
 WORST = 0.15
-"""Radius ratio below which the motion may not bring a triangle, unless the triangle was worse before."""
+"""Smallest radius ratio of a triangle after the move, unless it was worse before."""
 Keeper = Callable[[np.ndarray], np.ndarray]
-"""Moved points (n, 3) -> their allowed positions."""
+"""Moved points (n, 3) [m] -> their allowed positions (n, 3) [m]."""
 
 
 def with_volume(
     points: np.ndarray, triangles: np.ndarray, volume: float, level: Level, regions: Sequence[Region] = ()
 ) -> np.ndarray:
-    """Points (n, 3) [m] of the closed outward surface `triangles` (t, 3) moved until it encloses `volume` [m^3].
+    """Points (n, 3) [m] of a closed outward surface, moved so that its triangles (t, 3) enclose `volume` [m^3].
 
-    level: the shape, a distance [m] near its surface, on which the points lie. Each node goes along its normal by the
-    mean depth of the shape above the triangles around it, and all by one more length, which is sought. Nodes on the
-    outline of a region stay on it, and none changes sides. Raises StudyError when no small move has that volume.
+    level: of the shape, a distance [m] near its surface, on which the points lie. Each node moves along its normal by
+    the mean depth of the triangles around it below the shape, plus one length that is the same for all nodes and gives
+    the volume. Nodes on the outline of a region stay on it, and no node changes sides. Raises StudyError if no small
+    move gives the volume to ENOUGH without intersections.
     """
     keep, still = outline_keeper(points, regions), np.zeros(len(points), bool)
     for _ in range(ROUNDS):
@@ -62,7 +63,7 @@ def with_volume(
 def moved_to(
     points: np.ndarray, triangles: np.ndarray, volume: float, level: Level, keep: Keeper, still: np.ndarray
 ) -> np.ndarray:
-    """The points moved until the volume is met as well as it can be, those of `still` (n,) not at all."""
+    """The points moved so that the volume is met as well as possible; those of `still` (n,) bool do not move."""
     normals, most = vertex_normals(points, triangles), FARTHEST * mean_edges(points, triangles)
     sagging, most = depth(points, triangles, level), np.where(still, 0.0, most)
     area, further = float(triangle_areas(points, triangles).sum()), 0.0
@@ -76,7 +77,7 @@ def moved_to(
 
 
 def spoilt_nodes(before: np.ndarray, after: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Nodes (n,) bool of triangles that the move makes poor, turns over, or lets cross others."""
+    """Nodes (n,) bool of triangles that the move makes poor, inverts, or makes cross others."""
     old, new = triangle_radius_ratio(before, triangles), triangle_radius_ratio(after, triangles)
     one, other = triangle_normals(before, triangles), triangle_normals(after, triangles)
     bad = (new < np.minimum(old, WORST) - 1e-9) | (np.einsum("ij,ij->i", one, other) <= 0)
@@ -87,9 +88,9 @@ def spoilt_nodes(before: np.ndarray, after: np.ndarray, triangles: np.ndarray) -
 
 
 def depth(points: np.ndarray, triangles: np.ndarray, level: Level) -> np.ndarray:
-    """Mean depth [m] of the shape's surface above the triangles around each node, (n,), weighted by their areas.
+    """Mean depth [m] of the triangles around each node below the surface of the shape, (n,), weighted by area.
 
-    Of a triangle it is the mean over the middles of its edges: exact where the depth is quadratic.
+    That of a triangle is the mean over the middles of its edges, which is exact for a quadratic depth.
     """
     corners = points[triangles]
     middles = 0.5 * (corners + np.roll(corners, -1, axis=1))
@@ -108,7 +109,7 @@ def mean_edges(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
 
 
 def outline_keeper(points: np.ndarray, regions: Sequence[Region]) -> Keeper:
-    """A function that moves nodes of an outline back onto it, and others back to their side of it."""
+    """A function that moves nodes of an outline back onto it, and puts others back if they change sides of it."""
     reach = 10 * ON_CURVE * float(np.linalg.norm(np.ptp(points, axis=0)))
     before = [region.level(points) for region in regions]
 

@@ -1,1 +1,1 @@
-"""Charts of many runs at once: what breaks, what recovers, where steps are stable, other programs, populations."""
+"""Charts of many runs: random trials, recovery, stability, other programs, populations."""

@@ -1,4 +1,4 @@
-"""Which method survives what: statuses of the stress campaign, and the share that ends well over the step."""
+"""Which method survives which random trials: the share of each status, and of runs that end ok over the step."""
 
 from itertools import pairwise
 
@@ -35,9 +35,9 @@ LOOKS = {
     "timed-out": (GREY, "\\\\\\\\"),
     "unexplained": (VERMILLION, "++++"),
 }
-"""Colour and hatch of each status: the hatch repeats the information of the colour. Refused trials are not runs."""
+"""Status -> colour and hatch, which repeats the information of the colour. Refused trials are not runs."""
 EDGES = 2.0 ** np.arange(-4.0, 2.1, 1.0)
-"""Of the ranges of the step over the stability limit."""
+"""Limits of the ranges of the step over the stability limit [1]."""
 REFUSED = "refused"
 FEWEST = 5
 """Fewest trials in a range for which a share is shown."""
@@ -88,7 +88,10 @@ def _draw_bars(axes: Axes, shares: dict[str, list[float]]) -> None:
 
 
 def _draw_shares(axes: Axes, row: int, place: np.ndarray, well: np.ndarray) -> None:
-    """A row of ranges, shaded from white (none) to dark (all), with the number in each."""
+    """Draws the ranges of a method, shaded from white (none end ok) to dark (all), with the share [%] in each.
+
+    place (n,): range of each run; well (n,) bool: whether it ends ok.
+    """
     for column, (low, high) in enumerate(pairwise(EDGES)):
         inside = well[place == column]
         if len(inside) < FEWEST:

@@ -1,4 +1,4 @@
-"""The profiles of the league: what share of all (scene, quantity) pairs an engine solves within a budget."""
+"""The profiles of the league: the share of all (scene, quantity) pairs that an engine solves within a budget."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -24,26 +24,26 @@ TITLE = "What an engine solves within a budget: up and to the left is better"
 SPARE = tuple(
     zip((ORANGE, GREEN, BLUE, PURPLE, BLACK, MUTED[2], MUTED[1], MUTED[0], SKY, VERMILLION), "^sDvX<>hP*", strict=True)
 )
-"""Colours and markers of the engines, in the order of their appearance."""
+"""Colours and markers of the engines, in the order of appearance."""
 Steps = Sequence[tuple[float, float]]
 
 
 @dataclass(frozen=True)
 class Profiles:
-    """(budget, share) of every engine, for each tolerance."""
+    """(budget, share) of every engine for each kind of budget and each tolerance."""
 
     tolerances: tuple[str, ...]
-    """In words, a column each."""
+    """Tolerances in words, one per column."""
     budgets: tuple[str, ...]
-    """Names of the axes, a row each."""
+    """Labels of the horizontal axes, one per row."""
     of: Mapping[str, Mapping[tuple[int, int], Steps]]
-    """Engine -> (row, column) -> steps."""
+    """Engine -> (row, column) -> (budget, share) of each step, in rising order."""
     notes: tuple[str, ...] = ()
 
 
 @styled
 def figure(shown: Profiles) -> Figure:
-    """A row for each budget, a column for each tolerance."""
+    """A row for each kind of budget, a column for each tolerance."""
     if not any(steps for parts in shown.of.values() for steps in parts.values()):
         return blank(TITLE, "no entry is within a tolerance yet")
     sheet = page(3.6 * len(shown.tolerances) + 0.6, 3.1 * len(shown.budgets))

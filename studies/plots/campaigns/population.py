@@ -1,5 +1,5 @@
-"""Errors over a population: the share of members with at most a given error, a line for each body; and the error bound
-of 95 of 100 members against computing time."""
+"""Errors over a population: the share of members within an error, a line for each body; and the error bound of 95 of
+100 members over computing time."""
 
 from collections.abc import Sequence
 
@@ -23,9 +23,9 @@ TITLE = "Randomly generated organs: share of a population within an error"
 SHOWN = {"force_end": "error of the force [%]", "mean_error": "mean error / largest u [%]"}
 NO_FORCE = "the scenes compare no force"
 LOWEST = 0.02
-"""Errors below are drawn at the edge [%]."""
+"""Smaller errors are drawn here [%]."""
 STYLES = ("-", (0, (4, 1.6)), (0, (1, 1.2)))
-"""Of the sizes of one kind of body, small to large."""
+"""Lines of the bodies of one family, in the order of appearance."""
 
 
 @styled
@@ -58,12 +58,12 @@ def _judged(runs: Sequence[Run]) -> list[Group]:
 
 
 def _errors(group: Group, entry: Metric) -> list[float]:
-    """Absolute errors of the members that were judged, ascending."""
+    """Absolute errors [%] of the members that were judged, at least LOWEST, in rising order."""
     return sorted(max(abs(value), LOWEST) for value in group.values(entry)[0].values() if value == value)
 
 
 def _draw(panel: Axes, mine: Sequence[Group], entry: Metric) -> dict[str, Line2D]:
-    """The lines of one panel; a handle for each body by its name."""
+    """Draws the lines of one panel; returns name of each body -> its legend entry."""
     handles, sizes = {}, dict[str, int]()
     panel.axhline(BOUND, color=GREY, linewidth=1.0, linestyle=(0, (1.5, 2)))
     panel.text(
@@ -105,7 +105,7 @@ def _notes(all_groups: Sequence[Group]) -> list[str]:
 
 @styled
 def front(runs: Sequence[Run]) -> Figure:
-    """Error of 95 of 100 members against computing time; a column for each organ, a row for each metric."""
+    """Error of 95 of 100 members over computing time; a column for each organ, a row for each metric."""
     costs = {group: cost for group in _judged(runs) if (cost := _cost(group)) == cost}
     all_groups = list(costs)
     organs = list(dict.fromkeys(group.organ for group in all_groups))
@@ -137,13 +137,13 @@ def front(runs: Sequence[Run]) -> Figure:
 
 
 def _cost(group: Group) -> float:
-    """Median computing time over simulated time of the members that were timed; NaN where none was."""
+    """Median of computing time over simulated time [1] of the members that were timed; NaN without one."""
     speeds = [speed for run in group.runs if (speed := metric("real_time")(run)) == speed]
     return 1.0 / float(np.median(speeds)) if speeds else float("nan")
 
 
 def _draw_front(panel: Axes, bodies: Sequence[tuple[float, Group]], entry: Metric) -> dict[str, Line2D]:
-    """The points of one panel; a handle for each kind of body."""
+    """Draws the points of one panel, (cost, group) each; returns name of each family -> its legend entry."""
     wish = usual_wish(bodies[0][1].runs[0].case.scene)
     bound = wish.force if entry.name == "force_end" else wish.displacement
     handles = {}

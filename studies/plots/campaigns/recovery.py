@@ -1,4 +1,4 @@
-"""Whether a body started from an impossible shape comes back: the smallest volume ratio of its tetrahedra over time."""
+"""Whether a body returns from an impossible start: the smallest volume ratio of its tetrahedra over time."""
 
 from collections.abc import Sequence
 
@@ -20,7 +20,7 @@ LOWEST, HIGHEST = -1.6, 1.15
 COLUMNS = 3
 CHOSEN = PURPLE
 RETURNED = 0.01
-"""RMS distance from the rest shape over the size [%] up to which a body is back."""
+"""RMS distance from the rest shape over the size [%] below which a body has returned."""
 
 
 @styled
@@ -69,12 +69,12 @@ def _draw_start(axes: Axes, group: Sequence[Run], looks: dict[BodyRecipe, BodyLo
 
 
 def _colour(case: Case) -> str:
-    """The colour of the method; a method with other than default settings has a separate colour here."""
+    """The colour of the method, or CHOSEN for a method with settings other than the defaults."""
     return CHOSEN if chosen_settings(case.method) else method_colour(case.method.name)
 
 
 def _handles(shown: Sequence[Run], looks: dict[BodyRecipe, BodyLook]) -> list[Artist]:
-    """Legend entries for every body, and method with its settings, that occur together."""
+    """Legend entries for every body and method, with its settings, that occur together."""
     entries = []
     for case in {(looks[run.case.body], run.case.method_words): run.case for run in shown}.values():
         entry = body_handle(looks[case.body], case.method.name)
@@ -89,7 +89,7 @@ def _model(case: Case, looks: dict[BodyRecipe, BodyLook]) -> str:
 
 
 def _ends(shown: Sequence[Run], looks: dict[BodyRecipe, BodyLook]) -> list[str]:
-    """How many starts each model comes back from."""
+    """A sentence for each model: from how many starts it returns, and what share of elements else stays inverted."""
     inverted, distance = metric("inverted_share"), metric("rest_distance")
     sentences = []
     for group in grouped(shown, lambda run: (looks[run.case.body], run.case.method_words)):

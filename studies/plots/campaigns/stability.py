@@ -1,4 +1,4 @@
-"""Where a method breaks: status over time step and stiffness, with the theoretical limit drawn over it."""
+"""Where a method breaks: status over time step and stiffness, with the theoretical limit."""
 
 import textwrap
 from collections.abc import Sequence
@@ -18,7 +18,7 @@ from studies.store.record import Status
 
 TITLE = "Stability: time step × stiffness"
 TITLE_LETTERS = 52
-"""Letters of a line over a panel."""
+"""Letters in a line of the title of a panel."""
 MS = 1e3
 
 
@@ -43,7 +43,7 @@ def figure(runs: Sequence[Run]) -> Figure:
 
 
 def _draw_map(axes: Axes, group: Sequence[Run]) -> None:
-    """A tinted cell and a marker for each run; the limit as a line."""
+    """Draws a tinted cell and a marker for each run, and the limit as a line."""
     dt = np.array([MS * run.attributes.dt for run in group])
     factor = np.array([run.case.body.stiffness for run in group])
     edges_x, edges_y = _edges(dt), _edges(factor)
@@ -69,12 +69,12 @@ def _draw_map(axes: Axes, group: Sequence[Run]) -> None:
 
 
 def _title(run: Run, body: str) -> str:
-    """Scene, body and method, on two lines where one is too short."""
+    """Scene, body and method, in lines of up to TITLE_LETTERS."""
     return textwrap.fill(f"{heading(run.case.scene.name)}, {body}, {method_label(run.case.method.name)}", TITLE_LETTERS)
 
 
 def _edges(values: np.ndarray) -> dict[float, tuple[float, float]]:
-    """Value -> borders of its cell, half-way to its neighbours on a logarithmic axis."""
+    """Value -> borders of its cell, half way to its neighbours on a logarithmic axis."""
     unique = np.log(np.unique(values))
     step = np.diff(unique) if len(unique) > 1 else np.array([np.log(2.0)])
     middle = unique[:-1] + np.diff(unique) / 2
@@ -85,7 +85,7 @@ def _edges(values: np.ndarray) -> dict[float, tuple[float, float]]:
 
 
 def _draw_limit(axes: Axes, group: Sequence[Run]) -> None:
-    """The largest stable step of each stiffness, from the largest frequency of the springs at rest."""
+    """Draws the largest stable step [ms] of each stiffness, from the largest frequency of the springs at rest."""
     limits = {run.case.body.stiffness: MS * run.attributes.dt_limit for run in group}
     factor = np.array(sorted(limits))
     dt = np.array([limits[value] for value in factor])
@@ -95,7 +95,7 @@ def _draw_limit(axes: Axes, group: Sequence[Run]) -> None:
 
 
 def _modulus_axis(axes: Axes, group: Sequence[Run]) -> None:
-    """The same axis as the shear modulus that the springs match [kPa]."""
+    """Adds an axis on the right for the stiffness as the shear modulus that the springs match [kPa]."""
     modulus = group[0].case.scene.tissue.shear_modulus / 1e3
     there, back = (lambda factor: modulus * np.asarray(factor)), (lambda value: np.asarray(value) / modulus)
     twin = axes.secondary_yaxis("right", functions=(there, back))
@@ -117,7 +117,7 @@ def _handles(placed: Sequence[Run]) -> list:
 
 
 def _size_of(placed: Sequence[Run]) -> list[str]:
-    """What the map was measured on, and how often it agrees with the limit."""
+    """A note on the surface nodes, and on how many runs contradict the limit."""
     nodes = sorted({run.case.body.nodes for run in placed})
     below = [run for run in placed if run.attributes.dt < run.attributes.dt_limit]
     broken = sum(run.record.status == Status.DIVERGED for run in below)

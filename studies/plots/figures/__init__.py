@@ -1,1 +1,1 @@
-"""Pictures that are no charts of a study: the organs, and the figures of the paper."""
+"""Pictures that do not belong to a study: the organs, and the figures of the paper."""

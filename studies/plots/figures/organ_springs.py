@@ -1,4 +1,4 @@
-"""The paper's Figure 1 (JHC05) for our organs: as it looks, and its structural, inner and bending springs."""
+"""Figure 1 of the paper (JHC05) for our organs: each organ, and its structural, inner and bending springs."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -27,23 +27,23 @@ PANELS = {
     "bending springs": (SpringKind.BENDING, VERMILLION),
 }
 AXIS_WORD = {"stomach": "centre_line"}
-"""A bent organ's dominant axis follows it; a compact one's is straight."""
+"""Organ -> kind of dominant axis: a bent organ has its centre line; all others have a straight axis."""
 WIDTH, HEIGHT = 3.4, 3.6
-"""Of a panel [inch]."""
+"""Width and height of a panel [inch]."""
 NEAR, FAR = 0.9, 0.16
-"""Strength of the lines on the side of the eye and on the far side, between which depth is read."""
+"""Strength of the colour of lines on the near and on the far side, 0 (white) to 1."""
 
 
 def body_of(mesh: OrganMesh) -> Body:
-    """The paper's body on the outer surface of a mesh, its axis as the organ needs it."""
+    """The body of the paper on the outer surface of a mesh, with the axis of AXIS_WORD."""
     outer = mesh.outer()
-    # Springs' ends depend on the geometry alone; any material shows the same picture.
+    # The springs depend only on the geometry, so any material gives the same picture.
     return surface_body(outer.points, outer.triangles, Material(1000.0, 1000.0), AXIS_WORD.get(mesh.name, "straight"))
 
 
 @styled
 def figure(meshes: Mapping[str, OrganMesh]) -> Figure:
-    """One row per organ: rendered, structural, inner, bending springs."""
+    """One row per organ: the organ, and its structural, inner and bending springs; meshes: name -> mesh."""
     if not meshes:
         return blank(TITLE, "no organ given")
     sheet = page(WIDTH * (1 + len(PANELS)), HEIGHT * len(meshes))
@@ -61,12 +61,12 @@ def figure(meshes: Mapping[str, OrganMesh]) -> Figure:
 
 
 def draw_springs(axes: Axes, body: Body, mesh: OrganMesh, kind: SpringKind, colour: str) -> int:
-    """Draws the springs of one kind, the far ones first and paler; their number."""
+    """Draws the springs of one kind, the far ones first and paler; returns their number."""
     springs = body.springs.ends[body.springs.kind == kind].astype(np.int64)
     seen = FRONT.see(body.rest)
     facing = FRONT.see(vertex_normals(mesh.points, mesh.outer_triangles)[: mesh.outer_count])[:, 2]
     if kind == SpringKind.INNER:
-        # Inside the body there is no near and far side but only depth.
+        # Inner springs have no near and far side, only a depth.
         depth = seen[springs, 2].mean(axis=1)
         share = (depth - depth.min()) / np.ptp(depth)
     else:
@@ -84,5 +84,5 @@ def draw_springs(axes: Axes, body: Body, mesh: OrganMesh, kind: SpringKind, colo
 
 
 def draw_organ_springs(meshes: Mapping[str, OrganMesh], path: Path) -> None:
-    """Writes the picture as PNG."""
+    """Writes the picture as PNG. Raises StudyError if it cannot be written."""
     save(figure(meshes), path)

@@ -1,4 +1,4 @@
-"""The organs: smooth, with their meshes, cut open; attachments coloured, sizes and volumes written below."""
+"""The organs: smooth, with their meshes, and cut open, with coloured attachments, sizes and volumes."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -30,23 +30,27 @@ OTHER_SIDES = {
     "spleen": ("from the stomach", Camera(azimuth=-140.0, elevation=-14.0)),
     "bladder": ("from the right", Camera(azimuth=176.0, elevation=8.0)),
 }
-"""Views of what the front hides: hila, grooves, bare areas; from behind unless listed here."""
+"""Views of the meshes, which show what the front hides: hila, grooves, bare areas; from behind for other organs."""
 FIRST_SIDES = {"spleen": Camera(azimuth=-12.0, elevation=22.0)}
-"""Of the smooth picture; from the front unless listed here: a spleen shows its ribs' side and its notched border."""
+"""Views of the smooth pictures; from the front for other organs. The spleen shows its side towards the ribs and its
+notched border."""
 TISSUE, CUT = "#D9B3A6", "#B5655A"
 PATCH_COLOURS = (BLUE, ORANGE, GREEN, PURPLE, SKY)
 WIDTH, HEIGHT = 3.1, 8.6
-"""Of a column [inch]."""
+"""Width and height of a column [inch]."""
 ROUND = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0)
 """Lengths of a scale bar [m]."""
 FINE = 90
-"""Cells of the smooth picture along the diagonal of the organ's box."""
+"""Cells of the smooth picture along the diagonal of the box of the organ."""
 DPI = 110
 
 
 @styled
 def figure(meshes: Mapping[str, OrganMesh]) -> Figure:
-    """One column per organ of SHAPES, each filling its frame: smooth, with its mesh from another side, cut open."""
+    """One column per organ of SHAPES: smooth, with its mesh from another side, and cut open; each at its own scale.
+
+    meshes: name -> filled mesh.
+    """
     if not meshes:
         return blank(TITLE, "no organ given")
     sheet = page(WIDTH * len(meshes), HEIGHT)
@@ -68,7 +72,7 @@ def figure(meshes: Mapping[str, OrganMesh]) -> Figure:
 
 
 def draw_smooth(axes: Axes, shape: Shape, mesh: OrganMesh, colours: Mapping[str, str]) -> None:
-    """The true shape, the attachments that have a colour in it."""
+    """Draws the true shape, with the attachments that have a colour."""
     camera = FIRST_SIDES.get(mesh.name, FRONT)
     points, triangles = first_surface(replace(shape, cell=shape.size / FINE))
     own = uniform(TISSUE, len(triangles))
@@ -80,7 +84,7 @@ def draw_smooth(axes: Axes, shape: Shape, mesh: OrganMesh, colours: Mapping[str,
 
 
 def draw_mesh(axes: Axes, mesh: OrganMesh, colours: Mapping[str, str], camera: Camera) -> None:
-    """The outer surface with its triangles, its patches in their colours."""
+    """Draws the triangles of the outer surface, with the patches in their colours."""
     triangles = mesh.outer_triangles
     own = uniform(TISSUE, len(triangles))
     for patch in mesh.patches:
@@ -92,15 +96,14 @@ def draw_mesh(axes: Axes, mesh: OrganMesh, colours: Mapping[str, str], camera: C
 
 
 def draw_cut(axes: Axes, mesh: OrganMesh) -> None:
-    """The filled mesh without what lies in front of its middle: tetrahedra on the cut face, a lumen behind it."""
+    """Draws the part of the filled mesh behind its middle: tetrahedra on the cut face, and the lumen behind it."""
     normal = np.array([0.0, -1.0, 0.0])
     height = float((mesh.points @ normal).mean())
     corners, source = cut_surface(mesh.points, mesh.triangles, normal, height)
     light = smooth_normals(mesh.points, mesh.triangles)[source]
     draw_faces(axes, corners, light, uniform(TISSUE, len(corners)), FRONT, edges=0.4)
     face = cut_face(mesh.points, mesh.tetrahedra, normal, height)
-    # The cut face is in front of everything: it is drawn last, with its normals towards the eye for any order of its
-    # corners.
+    # The cut face is in front of everything, so it is drawn last, with all corners anticlockwise seen from the eye.
     turned = np.cross(face[:, 2] - face[:, 0], face[:, 3] - face[:, 1]) @ normal < 0
     face[turned] = face[turned][:, ::-1]
     draw_faces(axes, face, np.tile(normal, (len(face), 1)), uniform(CUT, len(face)), FRONT, edges=0.4)
@@ -108,7 +111,7 @@ def draw_cut(axes: Axes, mesh: OrganMesh) -> None:
 
 
 def window(axes: Axes, points: np.ndarray, camera: Camera) -> None:
-    """Frame around all points, with a scale bar below."""
+    """Sets the window around all points (n, 3) [m], with a scale bar at the bottom."""
     seen = camera.see(points)[:, :2]
     low, high = seen.min(axis=0), seen.max(axis=0)
     margin = 0.05 * (high - low).max()
@@ -118,7 +121,7 @@ def window(axes: Axes, points: np.ndarray, camera: Camera) -> None:
 
 
 def _describe(axes: Axes, mesh: OrganMesh, shape: Shape) -> None:
-    """Volumes next to those of the literature, with counts."""
+    """Writes volumes, those of the literature, and numbers of nodes, triangles and tetrahedra below a panel."""
     inside = f"{1e6 * (mesh.lumen_volume if mesh.hollow else mesh.volume):,.0f} mL"
     words = [f"wall {1e3 * (shape.wall or 0.0):g} mm, content {inside}" if mesh.hollow else inside]
     if shape.literature is not None:
@@ -130,5 +133,5 @@ def _describe(axes: Axes, mesh: OrganMesh, shape: Shape) -> None:
 
 
 def draw_organs(meshes: Mapping[str, OrganMesh], path: Path) -> None:
-    """Writes the picture as PNG."""
+    """Writes the picture as PNG. Raises StudyError if it cannot be written."""
     save(figure(meshes), path, DPI)

@@ -1,4 +1,4 @@
-"""The paper's Figures 2 and 3 (JHC05) from our runs: the ball after 800 iterations, and its volume on the way."""
+"""Figures 2 and 3 of the paper (JHC05) from our runs: the ball after 800 iterations, and its volume over them."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -19,17 +19,20 @@ SQUEEZED, VOLUME = "A ball after 800 iterations of being squeezed", "Volume of t
 NAMES = {"free": "without the constraint", "implicit_volume": "with the constraint"}
 PERCENT = 100.0
 SMALLEST = 1e-10
-"""Bottom of the logarithmic axis [%]: below it stands only what rounding leaves."""
+"""Bottom of the logarithmic axis [%]; smaller values are rounding errors."""
 
 
 def change(played: Played) -> np.ndarray:
-    """V/V0 − 1 of every frame [%], (F,)."""
+    """Volume over its target minus 1 in every frame [%], (F,)."""
     return PERCENT * (played.history.volume / played.history.volume_target - 1)[:, 0]
 
 
 @styled
 def squeezed_figure(balls: Mapping[str, Played]) -> Figure:
-    """At rest, and squeezed without and with the constraint: one scale and one camera."""
+    """The ball at rest, and squeezed without and with the constraint, with one scale and one camera.
+
+    balls: method -> run.
+    """
     sheet = page(3.4 * (1 + len(balls)), 3.6)
     axes = panels(sheet, 1, 1 + len(balls))[0]
     first = next(iter(balls.values()))
@@ -73,7 +76,7 @@ def _draw(axes: Axes, played: Played, points: np.ndarray, colour: str, t: float)
 
 @styled
 def volume_figure(balls: Mapping[str, Played]) -> Figure:
-    """In per cent, and its size again on a logarithmic axis."""
+    """The volume change in per cent, and its absolute value on a logarithmic axis, over iterations."""
     sheet = page(10.0, 3.9)
     left, right = panels(sheet, 1, 2)[0]
     for name, played in balls.items():
@@ -98,6 +101,6 @@ def volume_figure(balls: Mapping[str, Played]) -> Figure:
 
 
 def draw(balls: Mapping[str, Played], squeezed: Path, volume: Path) -> None:
-    """Writes both pictures as PNG."""
+    """Writes both pictures as PNG. Raises StudyError if one cannot be written."""
     save(squeezed_figure(balls), squeezed)
     save(volume_figure(balls), volume)

@@ -1,4 +1,4 @@
-"""The paper's Figure 4 (JHC05) from our run: a thin probe at its first contact with the stomach, deep in it, and on."""
+"""Figure 4 of the paper (JHC05) from our run: a thin probe at first contact with the stomach, deep in it, and later."""
 
 from pathlib import Path
 
@@ -19,16 +19,17 @@ from studies.scene.library.stomach_slide import PROBE
 TITLE = "A thin probe touches the refined stomach, presses deep, and slides"
 CAMERA = Camera(azimuth=-50.0, elevation=28.0)
 ROD, SIDES, PIECES = "#5B6B7A", 10, 60
-"""Colour of the probe's shaft, and its facets around and along."""
+"""Colour of the shaft of the probe, its facets around, and its rings of corners along."""
 SHAFT, THICK = 0.12, 0.0016
-"""Length and radius of the shaft as drawn [m]."""
+"""Length and radius of the shaft in the picture [m]."""
 CLOSE = 0.030
 """Half the width of a close-up [m]."""
 DPI = 150
 
 
 def rod(tip: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """A shaft along the probe's normal with its point at `tip` (3,) [m]: corners (k, 3, 3), unit normals (k, 3)."""
+    """A shaft along the normal of the probe with its point at `tip` (3,) [m]: corners (k, 3, 3) [m] and unit normals
+    (k, 3) of its triangles."""
     axis = np.asarray(PROBE.normal) / np.linalg.norm(PROBE.normal)
     across = np.cross(axis, [0.0, 0.0, 1.0])
     across /= np.linalg.norm(across)
@@ -46,7 +47,7 @@ def rod(tip: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 @styled
 def figure(slide: Played) -> Figure:
-    """A column per moment: the whole organ, and the contact from near with its mesh."""
+    """A column per moment: the whole organ, and a close-up of the contact with the mesh."""
     columns = moments(slide)
     sheet = page(3.7 * len(columns), 7.6)
     axes = panels(sheet, 2, len(columns))
@@ -76,7 +77,7 @@ def figure(slide: Played) -> Figure:
 
 
 def _window(seen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Room for the organ, (2,) and (2,) [m]."""
+    """Low and high corner, (2,) and (2,) [m], of a window around points seen by the camera (n, 2) [m]."""
     low, high = seen.min(axis=0), seen.max(axis=0)
     margin = 0.06 * float((high - low).max())
     return low - margin, high + margin
@@ -92,5 +93,5 @@ def _draw(axes: Axes, x: np.ndarray, triangles: np.ndarray, tip: np.ndarray, edg
 
 
 def draw(slide: Played, path: Path) -> None:
-    """Writes the picture as PNG."""
+    """Writes the picture as PNG. Raises StudyError if it cannot be written."""
     save(figure(slide), path, DPI)

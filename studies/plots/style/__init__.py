@@ -1,1 +1,1 @@
-"""Common parts of all charts: page, colours, three-dimensional pictures."""
+"""Common parts of all charts: page, colours, shaded pictures."""

@@ -15,7 +15,7 @@ from studies.plots.style.style import BODY_LOOKS, SPARE_LOOKS, method_colour, me
 from studies.runs.case import BodyRecipe
 
 OPTIONS = ("law", "axis", "weights", "stiffness", "nodes")
-"""Fields of a BodyRecipe that its `series` leaves out."""
+"""Fields of a BodyRecipe that its `series` does not name, and that a chart may have to."""
 
 
 @dataclass(frozen=True)
@@ -26,19 +26,19 @@ class BodyLook:
     line: LineStyleType
     marker: str
     family_colour: str | None = None
-    """In a chart of one method and several families of bodies; elsewhere the colour is that of the method."""
+    """Colour in a chart of one method and several families of bodies; None: the colour of the method."""
 
     def colour(self, method: str) -> str:
-        """Of the body with a method."""
+        """Colour of the body with the method of this name."""
         return self.family_colour or method_colour(method)
 
 
 def body_looks(runs: Sequence[Run], ignored: Sequence[str] = ()) -> dict[BodyRecipe, BodyLook]:
-    """The look of every body recipe of `runs`. Different names have different lines and markers as long as no more
-    than len(SPARE_LOOKS) of them are not in BODY_LOOKS; from there on the spare looks repeat.
+    """The look of every body recipe of `runs`.
 
-    A name is the recipe's `series`, followed by the options in which bodies of this series differ within a scene.
-    `ignored`: options that the chart shows in another way.
+    A name is the `series` of the recipe, followed by the options in which bodies of this series differ within a scene.
+    ignored: options that the chart shows in another way. The first name of a series in BODY_LOOKS takes its look, every
+    other name a spare look. Spare looks repeat after len(SPARE_LOOKS) names.
     """
     groups = [list(dict.fromkeys(run.case.body for run in group)) for group in by_scene(runs).values()]
     names = {body: _name(body, groups, ignored) for group in groups for body in group}
@@ -59,7 +59,7 @@ def _name(body: BodyRecipe, groups: Sequence[Sequence[BodyRecipe]], ignored: Seq
 
 
 def _words(body: BodyRecipe, option: str) -> str:
-    """An option as words: "cotangent", "150 nodes", "stiffness 2", "weights 1:1:1:1"."""
+    """The value of an option in words: "cotangent", "150 nodes", "stiffness 2", "weights 1:1:1:1"."""
     value = getattr(body, option)
     if option == "nodes":
         return f"{value:,} nodes"
@@ -69,13 +69,16 @@ def _words(body: BodyRecipe, option: str) -> str:
 
 
 def body_method_handles(runs: Sequence[Run], looks: dict[BodyRecipe, BodyLook], markers: bool = False) -> list[Artist]:
-    """Legend entries for every body and method that occur together, as `body_looks` draws them."""
+    """Legend entries for every body and method that occur together.
+
+    looks: of `body_looks`; markers: markers instead of lines.
+    """
     pairs = dict.fromkeys((looks[run.case.body], run.case.method.name) for run in runs)
     return [body_handle(look, method, markers) for look, method in pairs]
 
 
 def body_handle(look: BodyLook, method: str, markers: bool = False) -> Line2D:
-    """The legend entry of one body with one method."""
+    """The legend entry of a body with a method; markers: a marker instead of a line."""
     entry = Line2D([], [], color=look.colour(method), label=f"{look.name}, {method_label(method)}")
     if markers:
         entry.set(marker=look.marker, linestyle="", markersize=7)

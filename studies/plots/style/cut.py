@@ -1,4 +1,4 @@
-"""Bodies cut open by a plane: what is left of a surface, and the cut face of its tetrahedra."""
+"""Bodies cut open by a plane: the remaining part of a surface, and the cut face of the tetrahedra."""
 
 import numpy as np
 
@@ -6,9 +6,10 @@ import numpy as np
 def cut_surface(
     points: np.ndarray, triangles: np.ndarray, normal: np.ndarray, height: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """What of points (n, 3) [m] and triangles (t, 3) lies at x . normal <= height [m], triangles cut at the plane.
+    """The part x . normal <= height [m] of a surface of points (n, 3) [m] and triangles (t, 3), cut at the plane.
 
-    Returns corners (k, 3, 3) and for each the triangle it comes from (k,).
+    normal: unit vector. Returns the corners (k, 3, 3) [m] of its triangles, and the index of the triangle from which
+    each comes (k,).
     """
     above = points @ normal - height
     over = above[triangles] > 0
@@ -16,7 +17,7 @@ def cut_surface(
     pieces, source = [points[triangles[count == 0]]], [np.flatnonzero(count == 0)]
     for kept in (1, 2):
         rows = np.flatnonzero(count == 3 - kept)
-        # Turned so that the corner that is alone on its side comes first.
+        # The corner that is alone on its side comes first.
         alone = (over[rows] == (kept == 2)).argmax(axis=1)
         a, b, c = points[np.take_along_axis(triangles[rows], (alone[:, None] + [0, 1, 2]) % 3, axis=1)].transpose(
             1, 0, 2
@@ -29,7 +30,10 @@ def cut_surface(
 
 
 def cut_face(points: np.ndarray, tetrahedra: np.ndarray, normal: np.ndarray, height: float) -> np.ndarray:
-    """Polygons in which x . normal = height [m] cuts tetrahedra (k, 4), (p, 4, 3) [m]; triangles repeat a corner."""
+    """Polygons (p, 4, 3) [m] in which the plane x . normal = height [m] cuts tetrahedra (k, 4) on points (n, 3) [m].
+
+    Triangles repeat a corner; the order of the corners, clockwise or not, varies.
+    """
     over = (points @ normal > height)[tetrahedra]
     count = over.sum(axis=1)
     faces = [np.empty((0, 4, 3))]
@@ -48,12 +52,12 @@ def cut_face(points: np.ndarray, tetrahedra: np.ndarray, normal: np.ndarray, hei
 
 
 def _turned(points: np.ndarray, cells: np.ndarray, first: np.ndarray) -> np.ndarray:
-    """Corners (4, k, 3) of the cells with local corner `first` (k,) in front."""
+    """Corners (4, k, 3) of the cells, with the local corner `first` (k,) as the first one."""
     return points[np.take_along_axis(cells, (first[:, None] + np.arange(4)) % 4, axis=1)].transpose(1, 0, 2)
 
 
 def _crossing(a: np.ndarray, b: np.ndarray, normal: np.ndarray, height: float) -> np.ndarray:
-    """Points (k, 3) where the segments a b meet the plane."""
+    """Points (k, 3) where the segments from a to b (k, 3) meet the plane."""
     before, after = a @ normal - height, b @ normal - height
     share = before / (before - after)
     return a + share[:, None] * (b - a)

@@ -1,4 +1,4 @@
-"""Families of bodies, from the paper's body to quadratic elements, with a name, a colour and a marker in charts."""
+"""Families of bodies, from the body of the paper to quadratic elements, with their names, colours and markers."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -25,16 +25,16 @@ PAPER = "the paper's body"
 
 @dataclass(frozen=True)
 class Family:
-    """Bodies that differ by size, masses, contact and step only."""
+    """Bodies that differ only in size, masses, contact and step."""
 
     name: str
     colour: str
     marker: str | tuple[int, Literal[0, 1, 2], int]
-    """As matplotlib names it, or corners, kind (0: polygon, 1: star) and turn [degrees]."""
+    """Marker as matplotlib names it, or (number of corners, 0 for a polygon and 1 for a star, rotation [degrees])."""
 
 
 SMOOTH = "smooth"
-"""In place of its volumes: a body of smoothed springs, one volume per node."""
+"""Key in place of the volumes for a body of smoothed springs, which has one volume per node."""
 
 FAMILIES: dict[tuple[str, bool | str, str], Family] = {
     ("surface", False, "scene"): Family(PAPER, BLACK, "s"),
@@ -47,7 +47,7 @@ FAMILIES: dict[tuple[str, bool | str, str], Family] = {
     ("quadratic", ADAPTIVE, "scene"): Family("quadratic, adaptive", GREEN, (5, 1, 36)),
     ("tetrahedral", True, "scene"): Family("tetrahedra, graded", MUTED[4], "v"),
 }
-"""By kind of body, whether it is graded, and its volumes; colours by Okabe and Ito, no two markers alike."""
+"""(kind of body, whether it is graded, its volumes) -> family; no two markers are alike."""
 VIRTUAL_NODES = Family("tetrahedra, virtual nodes along a cut", MUTED[8], "8")
 CONTESTANTS: dict[tuple[str, str], Family] = {
     ("explicit_elements", "tetrahedral"): Family("explicit elements, linear", MUTED[7], "<"),
@@ -59,14 +59,18 @@ CONTESTANTS: dict[tuple[str, str], Family] = {
     ("linear_modes", "quadratic"): Family("linear modes", MUTED[5], (4, 1, 0)),
     ("elastic_response", "quadratic"): Family("elastic response, precomputed", MUTED[9], (4, 0, 20)),
 }
-"""Alternatives to mass-spring bodies, by method and kind of body."""
+"""Alternatives to mass-spring bodies: (method, kind of body) -> family."""
 OUR_METHODS = tuple(method.name for method in (*METHODS, *LITERATURE))
 WHOLE = "implicit_volume"
-"""The method that needs no name."""
+"""The method that a family does not name."""
 
 
 def family_of(case: Case) -> Family:
-    """The family of a case; a case in neither FAMILIES nor CONTESTANTS is grey, with the name of its method."""
+    """The family of a case: of CONTESTANTS by its method, or for the method WHOLE of FAMILIES by its body.
+
+    A known body with a method that is not ours has the colour of that method. Every other case is grey, with its series
+    and method as the name.
+    """
     body = case.body
     element = CONTESTANTS.get((case.method.name, body.kind))
     if element is not None:
@@ -76,7 +80,7 @@ def family_of(case: Case) -> Family:
     if family is not None and case.method.name == WHOLE:
         return family
     if family is not None and case.method.name not in OUR_METHODS:
-        # An entry of another program, or a method of one's own.
+        # An entry of another program, or a method of the user.
         return Family(f"{case.method.name.replace('_', ' ')}, {body.kind}", method_colour(case.method.name), "X")
     own = "" if case.method.name == WHOLE else f", {case.method.name.replace('_', ' ')}"
     return Family(f"{body.series}{own}", GREY, "X" if family is None else family.marker)

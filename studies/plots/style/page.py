@@ -1,4 +1,4 @@
-"""A chart's page: title above, panels, and below them, outside all data, the legend and the notes."""
+"""The page of a chart: title, panels, and below them, outside all data, the legend and the notes."""
 
 import textwrap
 from collections.abc import Callable, Sequence
@@ -19,23 +19,23 @@ from studies.metrics.run import Run, by_scene
 from studies.plots.style.style import BLACK, GREY, SMALL, remark, styled
 
 ROW, LINE, MARGIN = 0.25, 0.19, 0.12
-"""Heights of a legend row, of a line of notes, and of the space around them [inch]."""
+"""Heights of a legend row, of a line of notes, and of the margin around them [inch]."""
 LETTERS = 12.8
-"""Letters of a note to the inch: a wide line of them still fits."""
+"""Letters of a note per inch, so few that a line of wide letters fits."""
 NARROWEST = 8.0
 """Width of a page with one panel [inch]."""
 HANDLE = 0.62
-"""Width of a legend entry besides its words [inch]."""
+"""Width of a legend entry without its words [inch]."""
 MOST_NOTES = 8
 SHORT = 200.0
-"""A logarithmic axis from one end to the other of which values grow less than this has numbers between the decades."""
+"""A logarithmic axis whose ends have a smaller ratio than this has numbers between the decades."""
 
 
 def page(width: float, height: float) -> Figure:
-    """An empty page [inch], wide enough for words; `finish` adds the room for what stands below the panels."""
+    """An empty page, width and height [inch], at least NARROWEST wide; `finish` adds room for legend and notes."""
     figure = Figure(figsize=(max(width, NARROWEST), height), layout="constrained")
     engine = figure.get_layout_engine()
-    assert engine is not None  # asked for in the line above
+    assert engine is not None  # set in the line above
     engine.set(w_pad=0.06, h_pad=0.07, wspace=0.03, hspace=0.04)  # pyright: ignore[reportCallIssue]
     return figure
 
@@ -48,9 +48,9 @@ def panels(figure: Figure | SubFigure, rows: int, columns: int, **options: objec
 def panel_grid(
     count: int, columns: int, size: tuple[float, float], margin: tuple[float, float], **options: object
 ) -> tuple[Figure, np.ndarray]:
-    """A page of `count` panels of a size, at most `columns` in a row, and a margin, both (width, height) [inch].
+    """A page with `count` panels, at most `columns` in a row: the figure, and its axes (rows, columns).
 
-    Places that are left over stay empty.
+    size: of a panel, margin: of the page, both (width, height) [inch]. Spare axes are hidden.
     """
     columns = min(columns, count)
     rows = -(-count // columns)
@@ -64,7 +64,7 @@ def panel_grid(
 def finish(
     figure: Figure, title: str, handles: Sequence[Artist], notes: Sequence[str] = (), columns: int = 4
 ) -> Figure:
-    """Title, legend in rows of `columns`, and notes; the page grows by what they need."""
+    """Adds the title, a legend in up to `columns` columns, and up to MOST_NOTES notes; the page grows accordingly."""
     figure.suptitle(title)
     width, height = (float(size) for size in figure.get_size_inches())
     shown = [*notes[:MOST_NOTES], f"… and {len(notes) - MOST_NOTES} more remarks"] if len(notes) > MOST_NOTES else notes
@@ -88,7 +88,7 @@ def finish(
 
 
 def _fitting(columns: int, labels: Sequence[str], width: float) -> int:
-    """The largest number of legend columns up to `columns` that the page is wide enough for [inch]."""
+    """The largest number of legend columns, up to `columns`, that fits into the `width` of the page [inch]."""
     columns = max(1, min(columns, len(labels)))
     while columns > 1:
         longest = [max(map(len, part)) for part in np.array_split(np.array(labels, dtype=object), columns)]
@@ -100,7 +100,7 @@ def _fitting(columns: int, labels: Sequence[str], width: float) -> int:
 
 @styled
 def blank(title: str, reason: str) -> Figure:
-    """A page with the reason why there is no chart."""
+    """A page that says why there is no chart."""
     figure = page(8, 2.5)
     axes = figure.subplots()
     axes.set_axis_off()
@@ -109,7 +109,7 @@ def blank(title: str, reason: str) -> Figure:
 
 
 def grouped(runs: Sequence[Run], key: Callable[[Run], object]) -> list[list[Run]]:
-    """Runs with the same key together, in the order in which they come."""
+    """Groups of runs with the same key, in the order of their first runs."""
     groups: dict[object, list[Run]] = {}
     for run in runs:
         groups.setdefault(key(run), []).append(run)
@@ -117,7 +117,7 @@ def grouped(runs: Sequence[Run], key: Callable[[Run], object]) -> list[list[Run]
 
 
 def remarks(runs: Sequence[Run]) -> list[str]:
-    """What a chart cannot show, a sentence each: runs that broke off, scenes without a reference."""
+    """A sentence for each run that broke off, and one on the scenes without a reference."""
     ended = [f"{run.case.name}: {run.record.message or run.record.status}." for run in runs if not has_frames(run)]
     ended += [
         f"{run.case.name} {readable(run.record.status)}; shown up to there."
@@ -130,7 +130,7 @@ def remarks(runs: Sequence[Run]) -> list[str]:
 
 
 def unresolved_notes(runs: Sequence[Run], metrics: Sequence[Metric]) -> list[str]:
-    """A note for each scene whose reference is not ten times better than every error it judges, and in what."""
+    """A note for each scene in which the uncertainty of the reference is over a tenth of an error of these metrics."""
     notes = []
     for name, group in by_scene(runs).items():
         weak = [metric for metric in metrics if any(metric.unresolved(run) for run in group)]
@@ -150,12 +150,12 @@ def _share(metric: Metric, run: Run) -> float:
 
 
 def unresolved_mark(group: Sequence[Run], metrics: Sequence[Metric]) -> str:
-    """Behind the name of a scene that `unresolved_notes` has a note on."""
+    """The mark after the name of a scene on which `unresolved_notes` has a note; else ""."""
     return f" {UNRESOLVED_MARK}" if any(metric.unresolved(run) for metric in metrics for run in group) else ""
 
 
 def has_frames(run: Run) -> bool:
-    """Whether the run recorded any frame: one that could not start has none."""
+    """Whether the run recorded a frame; a run that could not start has none."""
     return "t" in run.record.fields and good_frames(run) > 0
 
 
@@ -165,7 +165,7 @@ def good_frames(run: Run) -> int:
 
 
 def reference_handle(label: str = "reference (finite elements)", **look: object) -> Line2D:
-    """The legend entry of the reference: black."""
+    """The legend entry of the reference, in black; look: properties of the line."""
     plain = {"marker": "o", "linestyle": "", "markersize": 5.5, "markeredgecolor": "white"} | look
     return Line2D([], [], color=BLACK, label=label, **plain)  # pyright: ignore[reportArgumentType]
 
@@ -190,7 +190,10 @@ def hollow_handle(colour: str) -> Line2D:
 
 
 def log_axis(axis: Axis) -> None:
-    """Plain numbers: 0.1, 1, 10, with 2 and 5 between them where the axis is short; powers of ten below 0.01."""
+    """Makes an axis logarithmic with plain numbers: 0.1, 1, 10, and 2 and 5 between them on a short axis.
+
+    Decades below 0.01 are powers of ten.
+    """
 
     def decade(value: float, _: int) -> str:
         return f"{value:g}" if value > 0.9e-2 else f"$10^{{{np.log10(value):.0f}}}$"
@@ -207,8 +210,10 @@ def log_axis(axis: Axis) -> None:
 
 
 def spread_out(heights: np.ndarray, gap: float, highest: float = np.inf) -> np.ndarray:
-    """The heights nearest to `heights` (n,), in the same order, at least `gap` apart and, where that leaves room above
-    zero, no higher than `highest`."""
+    """The heights (n,) nearest to `heights` (n,) by least squares, in the same order and at least `gap` apart.
+
+    None is above `highest`, unless the lowest would then be below zero.
+    """
     order = np.argsort(heights, kind="stable")
     ladder = gap * np.arange(len(heights))
     placed = np.empty(len(heights))

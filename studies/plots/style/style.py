@@ -1,4 +1,4 @@
-"""One look for all charts: colours for colour-blind readers too, type that survives half size, one way to save."""
+"""One look for all charts: colours for colour-blind readers, type that is legible at half size, saving."""
 
 import functools
 import io
@@ -24,7 +24,7 @@ P = ParamSpec("P")
 R = TypeVar("R")
 
 DPI = 110
-"""Of every picture: with it 10 inches are 1,100 pixels, and the smallest type is still read at half of that."""
+"""Resolution of pictures: 10 inches are 1,100 pixels, and the smallest type is legible at half of that."""
 SMALL, NORMAL, LARGE = 10.0, 11.5, 14.0
 """Type sizes [pt]: notes and tick labels, axes and legends, titles."""
 
@@ -34,12 +34,12 @@ YELLOW, BLUE, VERMILLION, PURPLE = "#F0E442", "#0072B2", "#D55E00", "#CC79A7"
 GREY, LIGHT, PALE = "#5A5A5A", "#B5B5B5", "#E4E4E4"
 
 METHOD_COLOURS = {"free": VERMILLION, "implicit_volume": BLUE}
-# Then the muted scheme of P. Tol, "Colour schemes", 2021.
+# The muted scheme of P. Tol, "Colour schemes", 2021.
 MUTED = ("#332288", "#999933", "#882255", "#44AA99", "#DDCC77", "#AA4499", "#117733", "#661100", "#88CCEE", "#CC6677")
-# And pear, light blue and olive of his light scheme, for the methods that came last.
+# Pear, light blue and olive of his light scheme.
 LIGHT_SCHEME = ("#BBCC33", "#77AADD", "#AAAA00")
 LITERATURE_COLOURS = ("#99DDFF", "#44BB99", "#EE8866", "#FFAABB")
-"""Light cyan, mint, orange and pink of the same."""
+"""Light cyan, mint, orange and pink of the same scheme."""
 OTHER_METHODS = (GREEN, PURPLE, ORANGE, SKY, *MUTED, *LIGHT_SCHEME)
 BODY_LOOKS: dict[str, tuple[LineStyleType, str]] = {
     "tetrahedral": ("-", "o"),
@@ -48,7 +48,7 @@ BODY_LOOKS: dict[str, tuple[LineStyleType, str]] = {
     "tetrahedral, nodal volumes": ((0, (6, 1.5, 1, 1.5)), "^"),
     "membrane": ((0, (2.5, 1)), "v"),
 }
-"""Line and marker of the bodies that look the same in every chart, by BodyRecipe.series."""
+"""BodyRecipe.series -> line and marker of the bodies that look the same in every chart."""
 SPARE_LOOKS: tuple[tuple[LineStyleType, str], ...] = (
     ((0, (4, 1, 1, 1, 1, 1)), "P"),
     ((0, (9, 1.5)), "<"),
@@ -61,7 +61,7 @@ SPARE_LOOKS: tuple[tuple[LineStyleType, str], ...] = (
     ((0, (2, 1, 2, 3)), "H"),
     ((0, (7, 1, 1, 1, 1, 1)), "8"),
 )
-"""Of any other body, in the order of its appearance; each dash pattern fits into the line of a legend entry."""
+"""Lines and markers of other bodies, in the order of appearance; each dash pattern fits into a legend entry."""
 STATUS_LOOKS: dict[Status, tuple[str, str]] = {
     Status.OK: (GREEN, "o"),
     Status.INVERTED: (PURPLE, "v"),
@@ -73,7 +73,7 @@ STATUS_LOOKS: dict[Status, tuple[str, str]] = {
     Status.FAILED: (LIGHT, "*"),
     Status.SKIPPED: (GREY, "_"),
 }
-"""Colour and marker; none is the colour of one of the first two methods."""
+"""Status -> colour and marker; no colour is in METHOD_COLOURS."""
 
 SHEET = {
     "font.family": "DejaVu Sans",  # comes with matplotlib: the same letters on every machine
@@ -105,11 +105,11 @@ SHEET = {
 
 
 VECTOR: dict[Any, Any] = {"svg.fonttype": "none", "svg.hashsalt": "organbench", "path.simplify_threshold": 0.3}
-"""Of SVG: letters stay letters, names in the file stay the same, and lines keep what a third of a pixel shows."""
+"""Settings of SVG: text stays text, identifiers are reproducible, and lines are simplified to a third of a pixel."""
 
 
 def styled(build: Callable[P, R]) -> Callable[P, R]:
-    """Runs `build` under matplotlib's defaults and SHEET, independent of the user's settings."""
+    """Decorates `build` to run with the defaults of matplotlib and SHEET, whatever the settings of the user."""
 
     @functools.wraps(build)
     def under_sheet(*args: P.args, **kwargs: P.kwargs) -> R:
@@ -121,8 +121,10 @@ def styled(build: Callable[P, R]) -> Callable[P, R]:
 
 @styled
 def save(figure: Figure, path: Path, dpi: int = DPI) -> None:
-    """Writes a PNG, whole or not at all; the same figure gives the same bytes. Inside `svg_copies` it is
-    also kept as SVG. Raises StudyError when it cannot be written."""
+    """Writes a figure as PNG, whole or not at all; the same figure gives the same bytes.
+
+    Inside `svg_copies` it is also kept as SVG. Raises StudyError if it cannot be written.
+    """
     image = io.BytesIO()
     FigureCanvasAgg(figure)
     figure.savefig(image, format="png", dpi=dpi, metadata={"Software": None}, facecolor="white")
@@ -133,11 +135,10 @@ def save(figure: Figure, path: Path, dpi: int = DPI) -> None:
 
 
 def drawing(figure: Callable[[R], Figure], dpi: int = DPI) -> Callable[[R, Path], None]:
-    """Decorates a function that makes a figure: the result writes the figure as a PNG file. Raises StudyError as `save`
-    does."""
+    """The function (shown, path) that writes `figure(shown)` as a PNG file. It raises StudyError as `save` does."""
 
     def draw(shown: R, path: Path) -> None:
-        """Writes the chart as PNG."""
+        """Writes the chart as PNG. Raises StudyError if it cannot be written."""
         save(figure(shown), path, dpi)
 
     draw.__module__ = figure.__module__
@@ -146,7 +147,7 @@ def drawing(figure: Callable[[R], Figure], dpi: int = DPI) -> Callable[[R, Path]
 
 @contextmanager
 def svg_copies() -> Iterator[dict[str, str]]:
-    """Inside, every chart that is saved is also kept as SVG: name of its file -> text, the same for the same figure."""
+    """Inside, `save` also keeps every chart as SVG: name of its file -> text, which is reproducible."""
     kept: dict[str, str] = {}
     token = _copies.set(kept)
     try:
@@ -159,7 +160,7 @@ _copies: ContextVar[dict[str, str] | None] = ContextVar("copies", default=None)
 
 
 def _svg(figure: Figure, dpi: int) -> str:
-    """With everything where the PNG has it: to lay it out again takes as long as to draw it."""
+    """The figure as SVG, with the layout of the PNG: a new layout would take as long as drawing."""
     text = io.StringIO()
     figure.set_layout_engine("none")
     with matplotlib.rc_context(VECTOR):
@@ -168,7 +169,7 @@ def _svg(figure: Figure, dpi: int) -> str:
 
 
 def method_colour(name: str) -> str:
-    """The colour a method has in every chart."""
+    """The colour of a method in every chart; that of an unknown method follows from a hash of its name."""
     if name in METHOD_COLOURS:
         return METHOD_COLOURS[name]
     for method, colour in zip(LITERATURE, LITERATURE_COLOURS, strict=True):
@@ -177,16 +178,16 @@ def method_colour(name: str) -> str:
     others = [method.name for method in METHODS if method.name not in METHOD_COLOURS]
     if name in others:
         return OTHER_METHODS[others.index(name) % len(OTHER_METHODS)]
-    spare = OTHER_METHODS[len(others) :] or OTHER_METHODS  # a method that is not in METHODS
+    spare = OTHER_METHODS[len(others) :] or OTHER_METHODS  # for a method that is in neither tuple
     return spare[zlib.crc32(name.encode()) % len(spare)]
 
 
 def method_label(name: str) -> str:
-    """The name of a method in a legend: that of a user's own method, or of an external entry, stays as it is."""
+    """The name of a method in a legend; the name of a method of the user or of another program stays unchanged."""
     ours = [method.name for method in (*METHODS, *LITERATURE)]
     return readable(name) if name in ours else name
 
 
 def remark(axes: Axes, text: str) -> None:
-    """Small grey words in the middle of a panel that has nothing to show."""
+    """Writes small grey words in the middle of an empty panel."""
     axes.text(0.5, 0.5, text, transform=axes.transAxes, ha="center", va="center", color=GREY, size=SMALL)
