@@ -29,14 +29,16 @@ def references_by_scene(references: References, scenes: Iterable[Scene]) -> dict
 
 
 def shape_of_reference(reference: Reference) -> ShapeErrors:
-    """Deviation of the finest, curved mesh of a reference from the true shape."""
+    """Deviation of the finest, curved mesh of a reference from the true shape. The distance is NaN in a scene with a
+    cut, whose faces belong to the boundary and lie inside the organ."""
     points, facets, _ = reference.boundary
-    return shape_errors(reference.scene.organ, rest_surfaces(points, facets), filled=True)
+    shape = shape_errors(reference.scene.organ, rest_surfaces(points, facets), filled=True)
+    return shape._replace(distance=float("nan")) if reference.scene.cuts else shape
 
 
 def uncertainty_table(references: Mapping[str, Reference]) -> pd.DataFrame:
     """A row per scene and quantity: its shares, their sum, order, shift; relative [%]. The same in all rows of a scene:
-    how far the finest mesh is from the true shape."""
+    how far the finest mesh is from the true shape, empty in a scene with a cut."""
     rows = []
     for scene, reference in references.items():
         shape = shape_of_reference(reference)

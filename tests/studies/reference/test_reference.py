@@ -1,6 +1,8 @@
 """The reference, from an octant solved on three very coarse meshes: right, whole, with an error bar."""
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
@@ -8,13 +10,14 @@ import pytest
 from studies.base.errors import StudyError
 from studies.geometry.mesh.organ_mesh import signed_volume
 from studies.geometry.surface.distance import hausdorff
-from studies.reference.load import load_reference
+from studies.reference.load import Reference, load_reference
 from studies.reference.problem import whole_forces
 from studies.reference.reference_solves import ReferenceSolve
 from studies.reference.solve import solve
 from studies.reference.uncertainty import QUANTITIES, uncertainties
-from studies.report.references import uncertainty_table
+from studies.report.references import shape_of_reference, uncertainty_table
 from studies.scene.library import ReferencePlan
+from studies.scene.library.ball_incised import BALL_INCISED
 from tests.studies.octant import SCENE
 
 RADIUS, SHEAR = 0.05, SCENE.tissue.shear_modulus
@@ -75,6 +78,14 @@ def test_the_table_of_references_tells_how_far_the_finest_mesh_is_from_the_true_
     table = uncertainty_table({"ball": reference})
     (distance,), (volume,) = table["shape_error [%]"].unique(), table["shape_volume [%]"].unique()
     assert 0 < distance < 0.5 and -0.3 < volume < 0
+
+
+def test_faces_of_a_cut_are_not_compared_with_the_true_shape(reference):
+    """They belong to the boundary and lie up to a third of the size inside the organ."""
+    scene = SimpleNamespace(organ=reference.scene.organ, cuts=BALL_INCISED.cuts)  # an octant cannot be cut
+    cut = cast(Reference, SimpleNamespace(scene=scene, boundary=reference.boundary))
+    assert np.isnan(shape_of_reference(cut).distance)
+    assert shape_of_reference(cut).volume == shape_of_reference(reference).volume
 
 
 @pytest.mark.slow
