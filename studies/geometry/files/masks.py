@@ -88,17 +88,19 @@ def load_nifti(path: Path) -> Mask:
 def load_nrrd(path: Path) -> Mask:
     """An NRRD image as a mask, with the names of the segments of 3D Slicer.
 
-    Raises StudyError if it is no mask, or if pynrrd is not installed.
+    Raises StudyError if it is no mask, if its axes have no directions in space, or if pynrrd is not installed.
     """
     try:
         import nrrd
     except ImportError as error:
         raise missing("pynrrd", path) from error
     data, header = nrrd.read(str(path))
-    affine = np.eye(4)
+    labels, affine = whole_numbers(data, path), np.eye(4)
     directions = np.asarray(header.get("space directions", np.diag(header.get("spacings", np.ones(3)))), float)
-    if directions.shape == (3, 3):
-        affine[:3, :3] = directions.T
+    directions = directions[np.isfinite(directions).any(axis=1)]  # an axis that is a list, as of 3D Slicer, has none
+    if directions.shape != (3, 3) or not np.isfinite(directions).all():
+        raise StudyError(f"{path.name} does not say how its three axes lie in space; export it with 'space directions'")
+    affine[:3, :3] = directions.T
     affine[:3, 3] = np.asarray(header.get("space origin", np.zeros(3)), float)
     names = {}
     for key, value in header.items():
@@ -106,7 +108,7 @@ def load_nrrd(path: Path) -> Mask:
         if match:
             names[int(value)] = str(header.get(f"Segment{match[1]}_Name", value))
     unit_name = str(next(iter(header.get("space units", [])), "")).strip('"')
-    return Mask(whole_numbers(data, path), affine, unit_of(unit_name), names)
+    return Mask(labels, affine, unit_of(unit_name), names)
 
 
 def missing(name: str, path: Path) -> StudyError:

@@ -81,6 +81,26 @@ def test_segments_of_slicer_have_names(tmp_path):
         read_mesh(path)
 
 
+def test_an_axis_that_lists_segments_does_not_change_the_size_of_a_voxel(tmp_path):
+    """3D Slicer writes one layer of segments as an array (1, a, b, c); its first axis has no direction in space."""
+    labels, affine = ellipsoid()
+    rows = np.vstack([np.full(3, np.nan), affine[:3, :3].T])
+    header = {"space": "left-posterior-superior", "space origin": affine[:3, 3], "kinds": ["list", *["domain"] * 3]}
+    plain, listed = tmp_path / "plain.nrrd", tmp_path / "listed.seg.nrrd"
+    nrrd.write(str(plain), labels, {"space directions": rows[1:], "space origin": affine[:3, 3]})
+    nrrd.write(str(listed), labels[None], header | {"space directions": rows})
+    volumes = [read_mesh(Source(path, "mm", part="1")).volume for path in (plain, listed)]
+    assert volumes[0] == volumes[1] == pytest.approx(4e-9 / 3 * np.pi * np.prod(AXES), rel=0.02)
+
+
+def test_axes_without_directions_in_space_get_a_sentence(tmp_path):
+    labels, _ = ellipsoid()
+    path = tmp_path / "no_space.nrrd"
+    nrrd.write(str(path), labels, {"spacings": [1.0, np.nan, 2.0]})
+    with pytest.raises(StudyError, match=r"no_space\.nrrd does not say how its three axes lie in space"):
+        read_mesh(path)
+
+
 def test_a_warning_names_an_organ_cut_off_by_the_image(tmp_path):
     labels, affine = ellipsoid(shift=30.0)
     path = nifti(tmp_path / "cut.nii", labels, affine)
