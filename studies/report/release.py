@@ -97,7 +97,11 @@ def schedule(all_steps: Sequence[Step], seconds: Sequence[float]) -> list[str]:
         products = f" ({', '.join(step.makes)})" if step.makes else ""
         lines.append(f"{number:2}  {step.command}{products}: {how_long}")
     hours = sum(seconds) / 3600.0
-    return [*lines, f"about {hours:.1f} h in all; references that are not published are solved with their studies"]
+    return [
+        *lines,
+        f"about {hours:.1f} h in all; references that are not published are solved with their studies; "
+        "where nothing is stored, times are estimates and may be wrong by a factor of three",
+    ]
 
 
 def check_complete(published: Path, all_steps: Sequence[Step]) -> None:

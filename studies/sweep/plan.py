@@ -17,6 +17,8 @@ from studies.sweep.job import REFERENCE, CaseJob, Job, case_jobs, jobs_of
 
 PHYSICS, TIMING = "physics", "timing"
 """The stages: the first in several processes, the second alone."""
+COPIED = "published "
+"""How the fingerprint of a reference begins that was copied (studies.reference.published.fingerprint_of)."""
 AGAIN = "asked for again"
 """Why stored cases are timed though their times are current."""
 
@@ -70,10 +72,11 @@ def kind_of(stage: str, label: str) -> str:
 
 def rates(ledger: Ledger, jobs: Sequence[Job]) -> dict[str, float]:
     """Measured over estimated seconds of what this machine has stored: of all references by their unknowns, of the
-    given cases; a kind of which nothing is stored is left out."""
+    given cases; a kind of which nothing is stored is left out. A published reference was copied, not solved here."""
     here, sums = machine_id(), {"case": [0.0, 0.0], "reference": [0.0, 0.0]}
     for entry in ledger.files(REFERENCES).values():
-        if entry.seconds and entry.unknowns and entry.machine == here:
+        solved_here = entry.machine == here and not entry.fingerprint.startswith(COPIED)
+        if entry.seconds and entry.unknowns and solved_here:
             sums["reference"][0] += entry.seconds
             sums["reference"][1] += SECONDS_PER_UNKNOWN * entry.unknowns
     for job in jobs:
@@ -103,9 +106,12 @@ def _cost(entry: Entry | None) -> tuple[float | None, int | None]:
 
 
 def expected(pieces: Sequence[Planned], jobs: int) -> float:
-    """Seconds that `pieces` take in `jobs` processes, timing alone: what each took, or would by its size."""
-    shared = {PHYSICS: jobs, TIMING: 1}
-    return sum((piece.guess if piece.seconds is None else piece.seconds) / shared[piece.stage] for piece in pieces)
+    """Seconds that `pieces` take in `jobs` processes, timing alone: what each took, or would by its size; at least as
+    long as the longest."""
+    seconds = {PHYSICS: [0.0], TIMING: [0.0]}
+    for piece in pieces:
+        seconds[piece.stage].append(piece.guess if piece.seconds is None else piece.seconds)
+    return max(sum(seconds[PHYSICS]) / jobs, *seconds[PHYSICS]) + sum(seconds[TIMING])
 
 
 def expected_bytes(pieces: Sequence[Planned]) -> tuple[int, int]:

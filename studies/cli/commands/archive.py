@@ -9,13 +9,14 @@ import typer
 from studies.catalog import STUDIES
 from studies.cli.terminal import Results, busy, say, warn
 from studies.report.archive.checking import check
-from studies.report.archive.packing import chosen, pack
+from studies.report.archive.packing import chosen, others, pack
 from studies.sweep.find_study import find_studies
 
 
 def archive(
     studies: Annotated[
-        list[str] | None, typer.Argument(metavar="STUDY", help="studies to pack; default: all with stored results")
+        list[str] | None,
+        typer.Argument(metavar="STUDY", help="studies to pack; default: all of the catalogue that are stored"),
     ] = None,
     output: Annotated[Path, typer.Option("-o", "--output", help="the zip file")] = Path("organbench-results.zip"),
     results: Results = Path("results"),
@@ -34,4 +35,6 @@ def archive(
     with busy(f"packing {', '.join(study.name for study in chosen_studies)}"):
         packed = pack(results, chosen_studies, output, datetime.now(UTC).date().isoformat(), files)
     warn(packed.remarks)
+    if not studies and (left := others(results, STUDIES)):
+        warn([f"not packed: {', '.join(left)}, of files; name them, as in `organbench archive FILE.py`"])
     say(f"{packed.path}: {packed.files} files, {packed.size / 1e6:.1f} MB")

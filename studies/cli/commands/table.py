@@ -115,12 +115,11 @@ class Layout:
 
     def fitting(self, metrics: list[Metric]) -> list[Column]:
         """Columns of as many of the first metrics as fit next to the labels; one at least."""
-        headings = max(len(self.heading(name)) for name in self.groups)
         width, columns = sum(column.width + 2 for column in self.labels) - 2, list[Column]()
         for metric in metrics:
             column = Column(head(metric), [cell(row, metric) for row in self.rows])
             width += 2 + column.width
-            if columns and max(width, headings) > console.width:
+            if columns and width > console.width:
                 break
             columns.append(column)
         return columns

@@ -21,6 +21,7 @@ from studies.base.errors import StudyError
 from studies.catalog.study import Study
 from studies.exchange.entry import entry_files
 from studies.metrics.timing.cases import timing_file
+from studies.reference.reference_solves import STUDY as REFERENCES
 from studies.reference.reference_solves import reference_solves
 from studies.report.archive.crate import CITATION, CODE, citation_file, digest, write_crate
 from studies.report.publish import check_studies
@@ -30,6 +31,7 @@ from studies.runs.user_code import files_of
 from studies.store.archived import MANIFEST, check_no_archive
 from studies.store.ledger import Ledger
 from studies.store.links import link_study
+from studies.store.paths import record_files
 
 SUFFIX = ".zip"
 README = """# Results of organbench {version}: {names}
@@ -54,6 +56,7 @@ class Packed:
 
     path: Path
     files: int
+    """With a checksum: all but the list of checksums."""
     size: int
     """Bytes."""
     remarks: list[str]
@@ -63,9 +66,18 @@ class Packed:
 def chosen(root: Path, catalogue: Sequence[Study]) -> list[Study]:
     """The studies of which something is stored. Raises StudyError where nothing is."""
     studies = [s for s in catalogue if any(is_there(case_path(root, s.name, case)) for case in s.cases)]
+    if not studies and (names := others(root, catalogue)):
+        raise StudyError(f"in {root} only studies of files are stored ({', '.join(names)}); name them: FILE.py")
     if not studies:
         raise StudyError(f"nothing is stored in {root}: `organbench run` makes results, --results names their folder")
     return studies
+
+
+def others(root: Path, studies: Iterable[Study]) -> list[str]:
+    """The folders of `root` with records of studies other than `studies`: their cases are in a file of the user."""
+    names = {REFERENCES, *(study.name for study in studies)}
+    folders = sorted(root.iterdir()) if root.is_dir() else []
+    return [folder.name for folder in folders if folder.name not in names and record_files(root, folder.name)]
 
 
 def pack(root: Path, studies: Sequence[Study], target: Path, day: str, extra: Iterable[Path] = ()) -> Packed:
@@ -85,7 +97,7 @@ def pack(root: Path, studies: Sequence[Study], target: Path, day: str, extra: It
         describe(stage, studies, day, [path for path in (*extra, *own_files(studies)) if path.is_file()])
         names = sorted(path for path in stage.rglob("*") if path.is_file())
         write_zip(stage, names, target, day)
-    return Packed(target, len(names), target.stat().st_size, remarks)
+    return Packed(target, len(names) - 1, target.stat().st_size, remarks)
 
 
 def own_files(studies: Sequence[Study]) -> list[Path]:

@@ -14,7 +14,7 @@ from studies.runs.case import BodyRecipe
 from studies.scene.kind import kind_of
 from studies.scene.library import SCENES
 from studies.scene.scene import Scene
-from studies.tools.advise.campaign import Stored, stored
+from studies.tools.advise.campaign import Stored, stored, stored_of_user
 from studies.tools.advise.kinds import same_kind, worst_of
 from studies.tools.advise.population import Unseen, unseen
 
@@ -115,10 +115,12 @@ def _bound(name: str, bound: float | None) -> float | None:
 
 
 def _evidence(scene: Scene, results: Path) -> tuple[Stored, tuple[str, ...]]:
-    """What is stored of a scene; of one that the study lacks, what is stored of scenes of its kind, and their names."""
+    """What is stored of a scene; of one that never ran, what is stored of scenes of its kind, and their names."""
     own = [other for other in ACCURACY.scenes if replace(other, reference=scene.reference) == scene]
     if own:
         return stored(results, own), ()
+    if (runs := stored_of_user(results, scene)) is not None:
+        return runs, ()
     if scene.cuts:
         raise StudyError(
             f"no results apply to scene '{scene.name}', which cuts its organ: '{ACCURACY.name}' has no such scene; "

@@ -11,6 +11,8 @@ import studies
 from studies.base.atomic import is_there
 from studies.base.errors import StudyError
 from studies.catalog.accuracy import ACCURACY
+from studies.catalog.of_scene import study_of
+from studies.catalog.study import Study
 from studies.metrics.judged import DISPLACEMENT, DISTANCE, FORCE, VOLUME, Judged, Measured, judged, over_meshes
 from studies.metrics.metric import Metric
 from studies.runs.case import Case
@@ -35,6 +37,7 @@ class Stored:
     """Name of a scene -> its cases that ended well and whose errors are known."""
     where: str
     """Folder or table it was read from."""
+    study: str = ACCURACY.name
 
 
 def stored(results: Path, scenes: Iterable[Scene]) -> Stored:
@@ -47,7 +50,7 @@ def stored(results: Path, scenes: Iterable[Scene]) -> Stored:
     cases, origins = dict[str, list[Judged]](), []
     published = published_for(results)
     for name, scene in by_name.items():
-        own, recipes = _runs(results, scene)
+        own, recipes = _runs(results, ACCURACY, scene)
         rows = (one for one in published_rows(published, scene) if one.compared)
         others = [one for one in rows if recipe_text(one.case) not in recipes]
         if own or others:
@@ -78,14 +81,22 @@ def _table(published: Path) -> Path:
     return published / ACCURACY.name / f"{ACCURACY.name}.csv"
 
 
-def _runs(results: Path, scene: Scene) -> tuple[list[Judged], set[str]]:
-    """Runs of a scene that ended well and whose errors are known, and the recipes of all runs that count: also of
-    those that ended badly."""
-    cases = [case for case in ACCURACY.cases if case.scene.name == scene.name]
-    there = tuple(case for case in cases if is_there(case_path(results, ACCURACY.name, case)))
+def stored_of_user(results: Path, scene: Scene) -> Stored | None:
+    """The runs of a user's scene by the study that `organbench run FILE.py` makes of it; None where none has an
+    error."""
+    study = study_of(scene)
+    own, _ = _runs(results, study, scene)
+    return Stored({scene.name: own}, str(results / study.name), study.name) if own else None
+
+
+def _runs(results: Path, study: Study, scene: Scene) -> tuple[list[Judged], set[str]]:
+    """Runs of a scene in a study that ended well and whose errors are known, and the recipes of all runs that count:
+    also of those that ended badly."""
+    cases = [case for case in study.cases if case.scene.name == scene.name]
+    there = tuple(case for case in cases if is_there(case_path(results, study.name, case)))
     if not there:
         return [], set()
-    runs, _ = load_runs(results, replace(ACCURACY, cases=there))  # the study itself reports what is missing
+    runs, _ = load_runs(results, replace(study, cases=there))  # the study itself reports what is missing
     own = [one for one in map(judged, runs) if one is not None and one.compared]
     bad = [run.case for run in runs if run.record.status != Status.OK]
     return own, {recipe_text(case) for case in (*(one.case for one in own), *bad)}

@@ -32,7 +32,8 @@ def worst_of(scene: Scene, groups: Sequence[Sequence[Judged]]) -> list[Judged]:
         if _refused(scene, case):
             continue
         force, displacement, cost, shape, volume = (_largest([getattr(one, name) for one in same]) for name in NUMBERS)
-        recipes.append(Judged(case, force, displacement, cost, shape=shape, shape_volume=volume))
+        meshes = tuple(mesh for one in same for mesh in one.members)
+        recipes.append(Judged(case, force, displacement, cost, shape=shape, shape_volume=volume, members=meshes))
     return recipes
 
 

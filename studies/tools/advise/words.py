@@ -56,7 +56,8 @@ def _verdict(answer: Advice) -> list[str]:
         )
     if answer.alike:
         lines.append(
-            f"this scene has not run: errors are the worst of {', '.join(answer.alike)}, scenes of the same kind"
+            "no run of this scene is stored: errors, shape and step are the worst of "
+            f"{', '.join(answer.alike)}, scenes of the same kind"
         )
     for name in answer.unknowable:
         uncertainty = max(getattr(row, name).uncertainty for group in answer.stored.cases.values() for row in group)
@@ -135,7 +136,9 @@ def _meshes(one: Judged, name: str) -> str:
         return ""
     if not one.members:
         return ", on one mesh: neighbouring meshes may differ several times"
-    return f", the largest of {len(one.members)} neighbouring meshes; median {one.median(name):.2g} %"
+    scenes = {mesh.case.scene.name for mesh in one.members}
+    of_scenes = f" of {len(scenes)} scenes" if len(scenes) > 1 else ""
+    return f", the largest of {len(one.members)} neighbouring meshes{of_scenes}; median {one.median(name):.2g} %"
 
 
 def _error(error: Measured, signed: bool = False) -> str:
@@ -158,7 +161,8 @@ def _computing(answer: Advice, one: Judged) -> str:
 def _command(answer: Advice, case: Case) -> str:
     if answer.alike:
         return "the line below with `measure` of studies: no stored study has this scene"
-    return f"organbench run {ACCURACY.name} --case {case.name}"
+    study = answer.stored.study
+    return f"organbench run {study if study == ACCURACY.name else 'FILE.py'} --case {case.name}"
 
 
 def in_python(case: Case) -> str:

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from studies.reference.published import published, record_of
+from studies.reference.published import fingerprint_of, published, record_of
 from studies.reference.reference_solves import ReferenceSolve, reference_solves
 from studies.runs.case import BodyRecipe, Case
 from studies.runs.current import case_path
@@ -100,11 +100,13 @@ def test_the_rate_of_references_is_that_of_all_that_this_machine_has_solved(tmp_
     path = job.store_failure("no mesh")
     assert rates(Ledger(tmp_path), []) == {}, "what failed at once has no rate"
     solved = read_record(path)
-    solved = replace(solved, attributes={**solved.attributes, "unknowns": 1000, "seconds": 4.0})
+    solved = replace(solved, fingerprint="code", attributes={**solved.attributes, "unknowns": 1000, "seconds": 4.0})
     write_record(path, solved)
     assert rates(Ledger(tmp_path), []) == {"reference": pytest.approx(4.0 / (1000 * SECONDS_PER_UNKNOWN))}
     write_record(path, replace(solved, machine="0" * len(machine_id())))
     assert rates(Ledger(tmp_path), []) == {}, "another machine solved it"
+    write_record(path, replace(solved, fingerprint=fingerprint_of(SCENES[0])))
+    assert rates(Ledger(tmp_path), []) == {}, "it is published, and was copied"
 
 
 def test_an_organ_that_cannot_be_read_fails_at_once():

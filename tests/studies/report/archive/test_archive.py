@@ -3,6 +3,7 @@
 import hashlib
 import json
 import os
+import shutil
 import subprocess
 import sys
 import zipfile
@@ -14,6 +15,7 @@ import pandas as pd
 import pytest
 
 from studies.base.errors import StudyError
+from studies.cli.commands import archive as archive_command
 from studies.exchange.entry import ENTRY, entry_path, outside
 from studies.metrics.timing import cases as timed
 from studies.report.archive import crate
@@ -116,6 +118,16 @@ def test_a_whole_archive_passes_the_check(organbench, packed, unpacked):
 
 def test_all_that_is_stored_is_chosen(finished_sweep):
     assert chosen(finished_sweep, [STUDY, replace(STUDY, name="other")]) == [STUDY]
+
+
+def test_studies_of_files_are_named_and_not_left_out_silently(organbench, refused, results, tmp_path, monkeypatch):
+    words = ("archive", "-o", tmp_path / "all.zip", "--results", results)
+    assert f"in {results} only studies of files are stored (tiny); name them: FILE.py" in refused(*words)
+    shutil.copytree(results / "tiny", results / "mine")
+    monkeypatch.setattr(archive_command, "STUDIES", (STUDY,))
+    code, out, err = organbench(*words)
+    assert code == 0 and "warning: not packed: mine, of files; name them, as in `organbench archive FILE.py`" in err
+    assert f": {check(tmp_path / 'all.zip')} files" in out
 
 
 def test_entries_from_outside_are_packed_with_their_row(results, tmp_path):

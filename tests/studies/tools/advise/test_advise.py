@@ -10,7 +10,7 @@ from studies.base.errors import StudyError
 from studies.meshing.true_surface import ShapeErrors
 from studies.metrics.table import study_table
 from studies.metrics.wish import usual_wish
-from studies.runs.case import BodyRecipe
+from studies.runs.case import BodyRecipe, neighbours
 from studies.scene.library import (
     BALL_CLAMPED,
     BLADDER_FILL,
@@ -24,6 +24,7 @@ from studies.store.record import Status
 from studies.store.tables import write_table
 from studies.tools.advise import answer as answers
 from studies.tools.advise.answer import advise, recommended
+from studies.tools.advise.words import lines_of
 from tests.plots.made_up import run
 from tests.studies.tools.advise.made_up_campaign import EVEN, FINE, GRADED, LADDER, ONE, PAPER, publish, row, rows_of
 
@@ -174,6 +175,23 @@ def test_a_scene_that_was_never_run_gets_the_worst_of_its_kind(tmp_path, never_t
     assert advice.chosen.cost.value == pytest.approx(1.5) and not advice.chosen.timed_here
     strict = advise(like(LIVER_PROBE), force=0.02, results=results, timing=False)
     assert body(strict) == FINE
+
+
+def test_runs_of_the_scene_of_a_user_count_more_than_those_of_other_scenes(tmp_path, monkeypatch, never_timed):
+    results, mine = publish(tmp_path, rows_of(LIVER_PROBE)), replace(LIVER_PROBE, name="mine", duration=9.0)
+    stored = run(mine, "quadratic", error=0.02, **GRADED_RUN | {"nodes": 1194})
+    stored_runs(monkeypatch, stored)
+    advice = advise(mine, results=results, timing=False)
+    assert advice.alike == () and advice.stored.where == str(results / "mine")
+    assert body(advice).nodes == 1194 and advice.chosen.force.value == pytest.approx(-2.0)
+    lines = "\n".join(lines_of(advice))
+    assert f"organbench run FILE.py --case {advice.chosen.case.name}" in lines and "on one mesh" in lines
+
+
+def test_errors_of_other_scenes_say_on_how_many_meshes(tmp_path, never_timed):
+    rows = [row(scene, one, LADDER[GRADED]) for scene in (LIVER_PROBE, KIDNEY_PROBE) for one in neighbours(GRADED)]
+    advice = advise(like(LIVER_PROBE), results=publish(tmp_path, rows), timing=False)
+    assert "the largest of 10 neighbouring meshes of 2 scenes; median 1.2 %" in "\n".join(lines_of(advice))
 
 
 def test_the_same_name_with_another_load_was_never_run(results):
