@@ -76,6 +76,11 @@ def step_limit(
 
     `added`: the method's `added_stiffness(body)`. Raises MassSpringError for a body without springs.
     """
+    if not (math.isfinite(damping) and damping >= 0):
+        raise MassSpringError(f"damping is {damping} 1/s; it must be zero or positive")
+    held = np.asarray([] if held_nodes is None else held_nodes)
+    if len(held) and not 0 <= held.min() <= held.max() < body.node_count:
+        raise MassSpringError(f"nodes are numbered from 0 to {body.node_count - 1}; correct held_nodes")
     frequency = (
         largest_frequency(body, held_nodes, added) if body.springs.count or len(body.membrane.triangles) else 0.0
     )

@@ -18,7 +18,7 @@ from massspring.body.springs import (
     matched_scale,
     unique_edges,
 )
-from massspring.body.surface import check_surface
+from massspring.body.surface import check_surface, checked_indices, checked_points
 from massspring.errors import MassSpringError
 from massspring.kernels.forces.volume import enclosed_volume
 
@@ -43,9 +43,13 @@ def tetrahedral_body(
     `body.keeping(Volumes.nodal(body))`. `share` (k,): part of each cell that is tissue (`virtual_nodes`); None: all.
     Raises MassSpringError.
     """
-    tetrahedra = np.ascontiguousarray(tetrahedra, dtype=np.uint32)
-    triangles = np.ascontiguousarray(triangles, dtype=np.uint32)
-    points = np.ascontiguousarray(points, dtype=np.float64)
+    points = checked_points(points)
+    tetrahedra = checked_indices("tetrahedra", tetrahedra, 4, len(points))
+    triangles = checked_indices("triangles", triangles, 3, len(points))
+    if not len(tetrahedra):
+        raise MassSpringError("the body has no tetrahedra; give a mesh of its inside, or use surface_body")
+    if share is not None and np.shape(share) != (len(tetrahedra),):
+        raise MassSpringError(f"share has shape {np.shape(share)}; give one number for each of {len(tetrahedra)} cells")
     edges = Edges(points, tetrahedra, share)
     check_positive(edges.volumes)
     springs, taut = _springs_of(law, edges, material.shear_modulus)
@@ -84,8 +88,8 @@ def surface_body(
     nodes follow the surface nodes; consecutive ones are joined by axial springs, without which the axis could come
     apart. Raises MassSpringError.
     """
-    triangles = np.ascontiguousarray(triangles, dtype=np.uint32)
-    points = np.ascontiguousarray(points, dtype=np.float64)
+    points = checked_points(points)
+    triangles = checked_indices("triangles", triangles, 3, len(points))
     check_surface(points, triangles)
     structural = unique_edges(triangles, EDGES_OF_TRIANGLE)
     virtual = virtual_nodes(points, triangles, float(lengths(points, structural).mean()), axis)

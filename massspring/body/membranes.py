@@ -4,7 +4,7 @@ import numpy as np
 
 from massspring.body.body import Body, Material
 from massspring.body.springs import EDGES_OF_TRIANGLE, SpringKind, Springs, lengths, unique_edges
-from massspring.body.surface import check_surface
+from massspring.body.surface import check_surface, checked_indices, checked_points
 from massspring.errors import MassSpringError
 from massspring.kernels.arrays.spring_layout import Membrane
 
@@ -52,8 +52,8 @@ def membrane_body(
     carried by the wall. `law`: "delingette", incompressible tissue (Poisson ratio ½); "lloyd", k_e = Σ (√3/4) E h with
     E = 3 mu, whose Poisson ratio is ⅓ (eq. 4.8). Raises MassSpringError.
     """
-    triangles = np.ascontiguousarray(triangles, dtype=np.uint32)
-    points = np.ascontiguousarray(points, dtype=np.float64)
+    points = checked_points(points)
+    triangles = checked_indices("triangles", triangles, 3, len(points))
     check_surface(points, triangles)
     if law not in MEMBRANE_LAWS:
         raise MassSpringError(f"unknown law '{law}' of a wall; known: {', '.join(MEMBRANE_LAWS)}")

@@ -14,6 +14,7 @@ from scipy.sparse import coo_array, triu
 from massspring.body.body import Body, Material
 from massspring.body.points import PAIRS, PointVolumes, gradients
 from massspring.body.springs import SpringKind, Springs
+from massspring.body.surface import checked_indices, checked_points
 from massspring.body.volumes import Volumes, tetrahedron_volumes
 from massspring.errors import MassSpringError
 
@@ -57,8 +58,8 @@ def quadratic_body(
     Its surface and its tetrahedra are the four flat parts of each facet and the eight of each element. Raises
     MassSpringError for an element that folds at one of its points or whose parts do.
     """
-    points = np.ascontiguousarray(points, dtype=np.float64)
-    cells = np.ascontiguousarray(cells, dtype=np.uint32)
+    points = checked_points(points)
+    cells = checked_indices("cells", cells, 10, len(points))
     slopes, weight = gradients(points, cells)
     _check_folds(points, cells, weight)
     springs = _springs(cells, weight, slopes, material.shear_modulus, len(points))

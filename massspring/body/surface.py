@@ -24,6 +24,29 @@ def check_finite(what: str, values: np.ndarray) -> None:
         )
 
 
+def checked_points(points: np.ndarray) -> np.ndarray:
+    """Points (n, 3) [m] as float64, in C order. Raises MassSpringError for another shape, and unless they are real
+    numbers."""
+    array = np.asarray(points)
+    if array.dtype.kind not in "fiu" or array.ndim != 2 or array.shape[1] != 3 or not len(array):
+        raise MassSpringError(f"the points are {array.dtype} of shape {array.shape}; give real numbers (n, 3) [m]")
+    return np.ascontiguousarray(array, dtype=np.float64)
+
+
+def checked_indices(what: str, indices: np.ndarray, columns: int, count: int) -> np.ndarray:
+    """Rows of `columns` node numbers, (k, columns), as uint32, in C order. Raises MassSpringError for another shape,
+    and unless they are whole numbers from 0 to `count` - 1. what: their name, in the plural."""
+    array = np.asarray(indices)
+    if array.dtype.kind not in "iu" or array.ndim != 2 or array.shape[1] != columns:
+        raise MassSpringError(
+            f"the {what} are {array.dtype} of shape {array.shape}; give whole numbers of nodes, (k, {columns})"
+        )
+    wrong = array[(array < 0) | (array >= count)]
+    if len(wrong):
+        raise MassSpringError(f"the {what} name node {wrong[0]}, but nodes are numbered from 0 to {count - 1}")
+    return np.ascontiguousarray(array, dtype=np.uint32)
+
+
 def check_surface(points: np.ndarray, triangles: np.ndarray) -> None:
     """Raises MassSpringError unless the surface is closed, consistently oriented (every directed edge occurs once, and
     its reverse once) and outward (positive volume).

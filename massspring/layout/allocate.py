@@ -84,12 +84,15 @@ def turned(volumes: Volumes) -> np.ndarray:
 def nodes_of(attachments: tuple[Attachment, ...], body: Body) -> list[np.ndarray]:
     """The nodes that each attachment holds. Raises MassSpringError if there are none, if one does not exist, or if one
     is held twice."""
-    nodes = [np.asarray(a.nodes, dtype=np.int64) for a in attachments]
+    nodes = [np.asarray(a.nodes) for a in attachments]
     for number, held in enumerate(nodes):
         if not len(held):
             raise MassSpringError(f"attachment {number} holds no node; widen its region or refine the mesh")
+        if held.dtype.kind not in "iu":
+            raise MassSpringError(f"the nodes of attachment {number} are {held.dtype}; give whole numbers")
         if held.min() < 0 or held.max() >= body.node_count:
             raise MassSpringError(f"attachment {number} names node {held.max()}; the body has {body.node_count} nodes")
+    nodes = [held.astype(np.int64) for held in nodes]
     if len(np.unique(np.concatenate([[], *nodes]))) != sum(map(len, nodes)):
         raise MassSpringError("two attachments hold the same node; their motions could contradict each other")
     return nodes

@@ -2,6 +2,7 @@
 
 import warnings
 from collections.abc import Collection, Mapping
+from dataclasses import fields, is_dataclass
 
 import numpy as np
 
@@ -82,6 +83,21 @@ def check_body(body: Body, method: Method) -> None:
             f"springs of law '{body.law}' pull every part of the body together, and it keeps {body.kept.count} "
             f"volumes for {body.node_count} nodes; keep one volume per node, or for {PATCH} of them"
         )
+
+
+def check_settings(method: Method) -> None:
+    """Raises MassSpringError for a number among the settings of one of this package's methods that is not finite, below
+    0, or not whole where its default is."""
+    for setting in fields(method) if is_dataclass(method) and type(method).__module__.startswith("massspring.") else ():
+        value, usual = getattr(method, setting.name), setting.default
+        if isinstance(usual, bool) or not isinstance(usual, int | float):
+            continue
+        kinds = int | np.integer if isinstance(usual, int) else int | float | np.number
+        if isinstance(value, bool) or not isinstance(value, kinds) or not 0 <= value < np.inf:
+            kind = "whole" if isinstance(usual, int) else "finite"
+            raise MassSpringError(
+                f"method '{method.name}': {setting.name} is {value!r}; give a {kind} number from 0 on, such as {usual}"
+            )
 
 
 def check_among(surroundings: Surroundings, method: Method) -> None:

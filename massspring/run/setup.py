@@ -22,6 +22,7 @@ from massspring.run.checks import (
     check_facets,
     check_nodal,
     check_probe,
+    check_settings,
     check_solid,
     check_surroundings,
     check_targets,
@@ -68,6 +69,7 @@ class Setup:
     None: none do."""
 
     def __post_init__(self) -> None:
+        check_settings(self.method)
         check_body(self.body, self.method)
         moved = self.velocity is not None or self.positions is not None
         around = Surroundings(self.obstacles, len(self.attachments), self.gravity, bool(self.targets), moved)

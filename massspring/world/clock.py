@@ -3,6 +3,8 @@
 import math
 from dataclasses import dataclass
 
+import numpy as np
+
 from massspring.analysis.stability import StepLimit
 from massspring.errors import MassSpringError
 
@@ -19,6 +21,14 @@ class Clock:
     frames: int
     steps: int
     """Steps per frame."""
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.frame) and self.frame > 0):
+            raise MassSpringError(f"a frame takes {self.frame} s; give a positive number")
+        for name in ("frames", "steps"):
+            value = getattr(self, name)
+            if not isinstance(value, int | np.integer) or value < 1:
+                raise MassSpringError(f"a clock has {name} = {value!r}; give a whole number from 1 on")
 
     @property
     def dt(self) -> float:
@@ -44,7 +54,7 @@ def make_clock(duration: float, frames: int, dt: float | str, limit: StepLimit, 
         longest = float(dt)
     if not (math.isfinite(longest) and longest > 0):
         raise MassSpringError(f"dt is {dt} s; it must be positive, the stability limit is {limit.damped:.3g} s")
-    if frames < 1 or not duration > 0:
+    if frames < 1 or not 0 < duration < math.inf:
         raise MassSpringError(
             f"{frames} frames in {duration} s; a run needs at least one frame and a positive duration"
         )

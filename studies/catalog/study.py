@@ -102,6 +102,9 @@ class Study:
     """How its cases may end besides ok and skipped: with any other status, `organbench run` ends with exit code 1."""
 
     def __post_init__(self) -> None:
+        for what in ("name", "question"):
+            if not isinstance(getattr(self, what), str):
+                raise StudyError(f"the {what} of a study is {getattr(self, what)!r}; give a text")
         if self.name in RESERVED:
             raise StudyError(f"a study cannot be called '{self.name}': that word has another meaning for the program")
         for what, kind in (("cases", Case), ("charts", Chart), ("columns", str), ("expects", str)):

@@ -4,6 +4,8 @@ is compared."""
 from collections.abc import Callable
 from dataclasses import dataclass
 
+import numpy as np
+
 from studies.metrics.run import Run
 from studies.scene.quantities import ALWAYS, allowed
 from studies.store.record import Status
@@ -39,7 +41,8 @@ class Metric:
         """The number; NaN where the run ended early, or its reference or timing is missing."""
         if run.record.status not in COMPARABLE or not self._allowed(run):
             return float("nan")
-        return float(self.of(run))
+        with np.errstate(divide="ignore", invalid="ignore"):  # of a reference that is 0 nothing is relative
+            return float(self.of(run))
 
     def uncertainty(self, run: Run) -> float:
         """Uncertainty of the reference in the metric's unit, or the spread of the number; NaN without one or if the

@@ -140,12 +140,13 @@ def uncertainties(
     if len(meshes) < 2:
         raise StudyError(f"the reference of '{scene.name}' has one mesh only, so no error bar; solve three")
     result = {}
-    for name, measure in QUANTITIES.items():
-        if not allowed(scene, name):
-            continue
-        mesh = uncertainty_of_meshes(scene, at, meshes, name)
-        shares = {key: setting_error(measure(at, meshes[-1], one), FACTORS[key]) for key, one in variants.items()}
-        result[name] = Uncertainty({"mesh": mesh.uncertainty, **shares}, mesh.order, mesh.shift)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        for name, measure in QUANTITIES.items():
+            if not allowed(scene, name):
+                continue
+            mesh = uncertainty_of_meshes(scene, at, meshes, name)
+            shares = {key: setting_error(measure(at, meshes[-1], one), FACTORS[key]) for key, one in variants.items()}
+            result[name] = Uncertainty({"mesh": mesh.uncertainty, **shares}, mesh.order, mesh.shift)
     return result
 
 
@@ -155,6 +156,8 @@ def uncertainty_of_meshes(scene: Scene, at: SamplePoints, meshes: Sequence[Sampl
     assert scene.reference is not None  # it was solved
     family = meshes[:FAMILY]
     finest = family[0]
+    if name in NUMBERS and not NUMBERS[name][1](finest).any():  # a force that is 0: nothing is relative to it
+        return MeshError(float("nan"), 0.0, float("nan"))
     if scene.reference.nested:
         changes = [QUANTITIES[name](at, other, finest) for other in family[1:]]
         return MeshError(nested_error([one.unknowns for one in family], changes), 0.0, float("nan"))

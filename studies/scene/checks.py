@@ -33,6 +33,8 @@ UNUSUAL = 100.0
 """Factor outside its usual range beyond which a number is an error."""
 LARGE = 10.0
 """Factor on the size of the body beyond which a length is an error."""
+COMPARED = ("force", "surface", "interior", "silhouette", "volume", "frequency")
+"""What the quantities of a scene may name."""
 AXIS_POINTS = 9
 SIDES = ((0, 1), (1, 2), (2, 0), (0, 1, 2))
 """Corners of a triangle whose mean is one more sample of the surface: its edges and its middle."""
@@ -51,6 +53,7 @@ def check_scene(scene: Scene) -> list[str]:
         *_unusual(scene, "duration", scene.duration, DURATION, "s"),
     ]
     _check_organ(scene)
+    _check_lumen(scene)
     for cut in scene.cuts:
         check_cuttable(scene, cut)
     if not scene.obstacles and not scene.held and not scene.cuts:
@@ -128,13 +131,23 @@ def _check_names(scene: Scene) -> None:
     twice = sorted({name for name in names if names.count(name) > 1})
     if twice:
         raise StudyError(f"scene '{scene.name}' has two regions called '{twice[0]}'; give each its own name")
+    for quantity in scene.quantities:
+        lookup(quantity, COMPARED, f"quantity of scene '{scene.name}'")
     probed, count = scene.probed, len(scene.obstacles if scene.probed.what == "obstacle" else scene.held)
-    if scene.reference is not None and "force" in scene.quantities and not 0 <= probed.number < count:
+    compares = "force" in scene.quantities and (count > 0 or scene.reference is not None)
+    if compares and not 0 <= probed.number < count:
         what = "obstacles" if probed.what == "obstacle" else "held regions"
         raise StudyError(
             f"scene '{scene.name}' probes the force at {probed.what} {probed.number}, and has {count} {what}, counted "
             "from 0; correct the number"
         )
+
+
+def _check_lumen(scene: Scene) -> None:
+    """Raises StudyError for a lumen in a solid organ. Whether a mesh file is hollow is known when it is meshed."""
+    organ = scene.organ
+    if scene.lumen is not None and organ.shape != "file" and make_shape(organ.shape, organ.parameters).wall is None:
+        raise StudyError(f"scene '{scene.name}' has a lumen, and its organ '{organ.shape}' is solid; leave it out")
 
 
 def _check_start(scene: Scene, number: int, depth: float, size: float) -> None:

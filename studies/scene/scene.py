@@ -1,5 +1,6 @@
 """A scene: an organ and its loads. Both solvers use the same scene, so load, contact and clock agree."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -77,8 +78,12 @@ class ForceOutput:
     def __post_init__(self) -> None:
         if self.what not in ("obstacle", "held"):
             raise StudyError(f"a force is probed at an 'obstacle' or a 'held' region, not at '{self.what}'")
+        if len(self.direction) != 3 or not abs(math.hypot(*self.direction) - 1.0) <= UNIT:
+            raise StudyError(f"a force is probed along {self.direction!r}; give a vector of length 1")
 
 
+UNIT = 1e-6
+"""Largest deviation of the length of a direction from 1."""
 FEWEST_UNKNOWNS = 1e3
 """Least value of a plan's `most`: with fewer unknowns a reference is too inaccurate."""
 
@@ -177,6 +182,8 @@ class Scene:
     """(method, reason): combinations that make no sense."""
 
     def __post_init__(self) -> None:
+        if not isinstance(self.name, str):
+            raise StudyError(f"a scene is called {self.name!r}; give a text")
         names = [cut.name for cut in self.cuts]
         twice = sorted({name for name in names if names.count(name) > 1})
         if twice:

@@ -1,5 +1,6 @@
 """Tissues with the sources of their constants."""
 
+import math
 import re
 from dataclasses import dataclass
 
@@ -18,6 +19,12 @@ class Tissue:
     """Where the numbers come from."""
     bulk_over_shear: float = 5000.0
     """kappa/mu of the reference [1]."""
+
+    def __post_init__(self) -> None:
+        for name, unit in (("shear_modulus", "Pa"), ("density", "kg/m³"), ("bulk_over_shear", "1")):
+            value = getattr(self, name)
+            if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 < value < math.inf:
+                raise StudyError(f"a tissue has {name} = {value!r} [{unit}]; give a finite number above 0")
 
 
 KIDNEY = Tissue(4900.0, 1050.0, "kidney, MR elastography at 45 Hz: 4.9 ± 0.5 kPa; density about 1,050 kg/m³")

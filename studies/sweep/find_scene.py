@@ -74,12 +74,17 @@ def find_scene(word: str) -> Scene:
     """A scene of the library by name, or that of FILE.py: SCENE, else the only scene of its STUDY. FILE.py:NAME is the
     scene of that name.
 
-    Raises StudyError for an unknown name, a file without a scene, and a file with several where none is named.
+    Raises StudyError for an unknown name, a file without a scene, a file with several where none is named, and a scene
+    that cannot start.
     """
     path, name = split_word(word)
     if not path:
         return lookup(word, {scene.name: scene for scene in (*SCENES, *CUT)}, "scene")
     file = read_user_file(path)
+    from studies.scene.checks import check_scene  # with the geometry of organs, which takes a while to load
+
+    for scene in file.scenes:
+        check_scene(scene)
     by_name = {scene.name: scene for scene in file.scenes}
     if name:
         return lookup(name, by_name, f"scene of {path}")

@@ -3,7 +3,15 @@
 import numpy as np
 import pytest
 
-from massspring import Body, MassSpringError, Material, surface_body, tetrahedral_body
+from massspring import (
+    Body,
+    MassSpringError,
+    Material,
+    membrane_body,
+    quadratic_body,
+    surface_body,
+    tetrahedral_body,
+)
 from massspring.body.axis import principal_axis
 from massspring.body.springs import SpringKind
 from tests.massspring.conftest import SOFT, block, icosphere
@@ -110,6 +118,46 @@ REFUSED = {
     "missing node": (lambda b: {"triangles": b.triangles + 10}, "names node"),
     "one triangle": (lambda b: {"triangles": b.triangles[:1]}, "at least 4"),
 }
+
+
+def with_first(array: np.ndarray, value: float) -> np.ndarray:
+    changed_array = array.astype(np.result_type(array, np.array(value)))
+    changed_array[0, 0] = value
+    return changed_array
+
+
+ARRAYS = {
+    "a node below 0": (lambda p, t, c: (p, t, with_first(c.astype(np.int64), -1)), "tetrahedra name node -1"),
+    "a node too many": (lambda p, t, c: (p, t, with_first(c, len(p))), "nodes are numbered from 0 to"),
+    "a triangle's node": (lambda p, t, c: (p, with_first(t.astype(np.int64), -1), c), "triangles name node -1"),
+    "fractions": (lambda p, t, c: (p, t, c + 0.7), "the tetrahedra are float64 .*; give whole numbers"),
+    "nan": (lambda p, t, c: (p, t, c * np.nan), "the tetrahedra are float64"),
+    "columns": (lambda p, t, c: (p, c, c), r"the triangles are .* of shape .* 4\); give whole numbers"),
+    "none": (lambda p, t, c: (p, t, c[:0]), "no tetrahedra"),
+    "complex": (lambda p, t, c: (p + 1j, t, c), r"the points are complex128 .*; give real numbers \(n, 3\) \[m\]"),
+    "text": (lambda p, t, c: (p.astype(str), t, c), "the points are <U"),
+    "flat list": (lambda p, t, c: (p.ravel(), t, c), "the points are float64 of shape"),
+}
+
+
+@pytest.mark.parametrize("name", ARRAYS)
+def test_arrays_that_are_no_mesh_are_refused_in_one_sentence(name):
+    """A node below 0 was read as one of 4 billion, outside all memory."""
+    spoil, words = ARRAYS[name]
+    with pytest.raises(MassSpringError, match=words):
+        tetrahedral_body(*spoil(*block((2, 2, 2))), SOFT)
+
+
+def test_every_body_refuses_nodes_that_do_not_exist():
+    points, triangles = icosphere(1)
+    wrong = with_first(triangles.astype(np.int64), -1)
+    for make in (
+        lambda: surface_body(points, wrong, SOFT),
+        lambda: membrane_body(points, wrong, 0.001, SOFT),
+        lambda: quadratic_body(points, np.full((1, 10), -1), SOFT),
+    ):
+        with pytest.raises(MassSpringError, match="name node -1"):
+            make()
 
 
 def turned(body: Body) -> np.ndarray:

@@ -3,7 +3,21 @@
 import numpy as np
 import pytest
 
-from massspring import Free, ImplicitVolume, MassSpringError, Plane, Ramp, Setup, Sphere, Trajectory, simulate
+from massspring import (
+    Attachment,
+    Clock,
+    Free,
+    ImplicitVolume,
+    MassSpringError,
+    Plane,
+    Ramp,
+    Setup,
+    Sphere,
+    Trajectory,
+    make_clock,
+    simulate,
+    step_limit,
+)
 from tests.massspring.methods.test_methods import clock_for
 
 
@@ -24,6 +38,62 @@ def test_what_is_not_finite_at_the_start_is_refused(block_body, changes, words):
     options = {name: spoiled if isinstance(value, str) else value for name, value in changes.items()}
     with pytest.raises(MassSpringError, match=words):
         Setup(block_body, Free(), clock_for(block_body, 1, 1), **options)
+
+
+@pytest.mark.parametrize(
+    ("method", "words"),
+    [
+        (ImplicitVolume(most_iterations=-1), "most_iterations is -1; give a whole number from 0 on, such as 200"),
+        (ImplicitVolume(most_iterations=2.5), "most_iterations is 2.5; give a whole number"),
+        (ImplicitVolume(tolerance="x"), "tolerance is 'x'; give a finite number from 0 on, such as 1e-06"),
+        (ImplicitVolume(tolerance=np.nan), "tolerance is nan; give a finite number"),
+        (ImplicitVolume(tolerance=True), "tolerance is True; give a finite number"),
+    ],
+)
+def test_settings_that_no_method_can_use_are_refused(block_body, method, words):
+    with pytest.raises(MassSpringError, match=words):
+        Setup(block_body, method, clock_for(block_body, 1, 1))
+
+
+@pytest.mark.parametrize(
+    ("numbers", "words"),
+    [
+        ((-0.005, 2, 3), "a frame takes -0.005 s"),
+        ((0.0, 2, 3), "a frame takes 0.0 s"),
+        ((np.nan, 2, 3), "a frame takes nan s"),
+        ((0.01, 2.5, 3), "frames = 2.5"),
+        ((0.01, 2, 0), "steps = 0; give a whole number from 1 on"),
+    ],
+)
+def test_a_clock_that_cannot_run_is_refused(numbers, words):
+    with pytest.raises(MassSpringError, match=words):
+        Clock(*numbers)
+
+
+def test_a_duration_without_end_is_refused(block_body):
+    with pytest.raises(MassSpringError, match="3 frames in inf s"):
+        make_clock(np.inf, 3, "auto", step_limit(block_body))
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"damping": -5.0}, "damping is -5.0 1/s; it must be zero or positive"),
+        ({"damping": np.nan}, "damping is nan 1/s"),
+        ({"held_nodes": np.array([-1])}, "nodes are numbered from 0 to"),
+        ({"held_nodes": np.array([10**6])}, "nodes are numbered from 0 to"),
+    ],
+)
+def test_no_limit_of_the_step_is_given_for_impossible_numbers(block_body, options, words):
+    with pytest.raises(MassSpringError, match=words):
+        step_limit(block_body, **options)
+
+
+@pytest.mark.parametrize("nodes", [np.array([0.5, 1.9]), np.array([True, False, True])])
+def test_nodes_of_an_attachment_are_whole_numbers(block_body, nodes):
+    setup = Setup(block_body, Free(), clock_for(block_body, 1, 1), attachments=(Attachment(nodes),))
+    with pytest.raises(MassSpringError, match=f"the nodes of attachment 0 are {nodes.dtype}; give whole numbers"):
+        setup.start()
 
 
 @pytest.mark.parametrize("wrong", [np.nan, np.inf])

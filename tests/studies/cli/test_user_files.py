@@ -56,6 +56,17 @@ def test_of_several_scenes_a_sentence_asks_which(write):
         find_scene(f"{path}:othr")
 
 
+def test_a_scene_that_cannot_start_is_refused_by_every_command(write):
+    with pytest.raises(StudyError, match="frames is 0; give a whole number from 1 on"):
+        find_scene(write("SCENE = replace(SQUEEZE, frames=0)\n"))
+
+
+@pytest.mark.parametrize("text", ["STUDY = replace(tiny_study(), name=7)", "STUDY = replace(tiny_study(), question=5)"])
+def test_a_study_has_a_name_and_a_question_in_words(write, text):
+    with pytest.raises(StudyError, match=r"of a study is [57]; give a text"):
+        find_study(write(text))
+
+
 def test_a_scene_alone_is_a_study_of_four_bodies_with_charts(write):
     study = find_study(write(SCENE))
     assert study.name == "alone" and study.charts and [scene.name for scene in study.scenes] == ["alone"]

@@ -118,6 +118,15 @@ def test_settings_are_compared_with_the_coarsest_mesh_and_add_to_the_bar():
     assert bar.total == pytest.approx(np.hypot(bar.shares["mesh"], bar.shares["steps"]), rel=1e-12)
 
 
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("scene", [BALL_CLAMPED, BALL_SQUEEZE], ids=lambda scene: scene.reference.mesh)
+def test_a_force_that_is_zero_has_no_relative_bar(scene):
+    """An obstacle that never touches: nested meshes, and octants by Richardson's extrapolation."""
+    meshes = [replace(one, force=0.0 * one.force, size=0.01 * k) for k, one in enumerate(family(), 1)]
+    bars = uncertainties(scene, AT, meshes, {"steps": replace(meshes[-1], variant="steps")})
+    assert np.isnan(bars["force"].total) and np.isnan(bars["force_end"].total) and bars["volume"].total > 0
+
+
 def test_every_quantity_that_is_compared_has_a_bar():
     assert set(uncertainties_of(family())) == set(QUANTITIES) - {"lumen", "frequency", "opening"}
     with pytest.raises(StudyError, match="one mesh only"):

@@ -71,6 +71,21 @@ BROKEN = {
         "reference=PLAN, probed=ForceOutput('obstacle', 2, (0, 0, 1))",
         "probes the force at obstacle 2, and has 2 obstacles, counted from 0",
     ),
+    "force at no obstacle, no reference": (
+        "probed=ForceOutput('obstacle', 99, (0, 0, 1))",
+        "probes the force at obstacle 99, and has 2 obstacles, counted from 0",
+    ),
+    "force along nothing": ("probed=ForceOutput('obstacle', 0, (0.0, 0.0, 0.0))", "give a vector of length 1"),
+    "twice the force": ("probed=ForceOutput('obstacle', 0, (0.0, 0.0, 2.0))", "give a vector of length 1"),
+    "unknown quantity": ("quantities=('volum',)", "unknown quantity of scene 'tiny_squeeze' 'volum'; did you mean"),
+    "lumen of a solid organ": ("lumen=Lumen()", "has a lumen, and its organ 'ball' is solid; leave it out"),
+    "name that is a number": ("name=5", "a scene is called 5; give a text"),
+    "density below 0": (
+        "tissue=replace(SOFT, density=-1.0)",
+        "a tissue has density = -1.0 [kg/m³]; give a finite number",
+    ),
+    "checkpoints of another kind": ("checkpoints=None", "checkpoints is None; give a tuple of times [s]"),
+    "checkpoints after the end": ("checkpoints=(1.0, 99.0)", "its checkpoints end at 99.0 s and the scene at"),
     "tissue in MPa": (
         "tissue=replace(SOFT, shear_modulus=0.0018)",
         "the shear modulus is 0.0018 Pa, the usual range is 100 to 100,000: is it in Pa?",
