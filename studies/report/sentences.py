@@ -14,10 +14,11 @@ from studies.catalog.population import POPULATION, RANGES
 from studies.meshing.bounds import SHAPE
 from studies.metrics.cells import MINUS, plain
 from studies.metrics.distribution import distribution
-from studies.metrics.judged import Judged, over_meshes
-from studies.metrics.wish import Wish, usual_wish
+from studies.metrics.judged import Measured, over_meshes
+from studies.metrics.wish import usual_wish
 from studies.plots.campaigns.recovery import RETURNED
-from studies.report.summary import choice_of
+from studies.report.kept_volume import WORST
+from studies.report.summary import Choice, choice_of
 from studies.runs.recipe_text import body_words
 from studies.scene.library import CUT
 from studies.store.record import Status
@@ -33,7 +34,7 @@ DISTANCE = "shape_error [%]"
 OURS = "implicit_volume"
 LINEAR = ("bullet", "drake", "mujoco", "newton")
 """Engines of the league on linear tetrahedra."""
-NODAL = "tetrahedral, nodal volumes"
+NODAL, UNIFORM = "tetrahedral, nodal volumes", "quadratic, masses by stiffness"
 SECOND_LOOK = 0.25
 """Steps over the stability limit up to here are for a second look, not for the comparison [1]."""
 TOGETHER = ("baumgarte", "implicit_springs", "implicit_volume", "penalty", "post_stabilization", "pressure",
@@ -68,7 +69,13 @@ class Sentences:
         points = [f"- {text}" for text in self.text(published)]
         if self.page.startswith("docs/"):  # links are written as from README
             points = [point.replace("](results/", "](../results/").replace("](docs/", "](") for point in points]
-        return "\n".join(fill(text, WIDTH, subsequent_indent="  ", break_on_hyphens=False) for text in points)
+        return "\n".join(map(_wrapped, points))
+
+
+def _wrapped(text: str) -> str:
+    """A paragraph at most WIDTH columns wide; the lines of a table below it stay as they are."""
+    words, *rows = text.split("\n")
+    return "\n".join([fill(words, WIDTH, subsequent_indent="  ", break_on_hyphens=False), *rows])
 
 
 def table(published: Path, study: str, name: str = "") -> list[Row]:
@@ -119,18 +126,18 @@ def constraint(published: Path) -> str:
     times = {
         (row["scene"], row["body"], row["nodes"], row["method"]): row[STEP] for row in table(published, "frame_rate")
     }
-    nodes = max(row["nodes"] for row in rows)
-    more = [
-        100 * (time / times[*key, "free"] - 1)
-        for (*key, method), time in times.items()
-        if method == OURS and key[-1] == nodes
-    ]
+    more = dict[int, list[float]]()
+    for (*key, method), time in times.items():
+        if method == OURS:
+            more.setdefault(key[-1], []).append(100 * (time / times[*key, "free"] - 1))
+    longer = " and ".join(f"{_range(shares)} % longer with {nodes:,}" for nodes, shares in sorted(more.items()))
+    kept = [row for row in table(published, "", "kept_volume") if row["method"] == OURS]
     return (
-        f"**The constraint keeps the volume and costs little.** In the study `volume_loss` (one kept volume, "
-        f"{nodes} surface nodes) the volume is never more than {lost[OURS]:.6f} % off "
-        f"with it; springs alone lose up to "
-        f"{lost['free']:.0f} %. A step takes {_range(more)} % longer ([frame "
-        f"times](results/published/frame_rate/cost_ratio.png))."
+        f"**The constraint keeps the volume.** In the study `volume_loss` (one kept volume, "
+        f"{max(row['nodes'] for row in rows)} surface nodes) it is never more than {lost[OURS]:.6f} % off; springs "
+        f"alone lose up to {lost['free']:.0f} %. In all studies it is at most {100 * max(column(kept, WORST)):.2g} % "
+        f"off with steps of at most half the stability limit. With the constraint a step takes {longer} surface nodes "
+        f"([frame times](results/published/frame_rate/cost_ratio.png))."
     )
 
 
@@ -141,40 +148,49 @@ def one_volume(published: Path) -> str:
         [-force for force in column((row for row in rows if row["body"] == body), FORCE)]
         for body in ("tetrahedral", "surface")
     )
+    bodies, errors = {(row["scene"], row["body"]) for row in rows}, dict[tuple[str, str], dict[int, float]]()
+    for row in table(published, ACCURACY.name):
+        body = row["scene"], row["body"]
+        if row["method"] == OURS and body in bodies:
+            errors.setdefault(body, {})[row["nodes"]] = abs(row[FORCE])
+    few, *_, many = sorted({nodes for by_nodes in errors.values() for nodes in by_nodes})
+    grown = sum(by_nodes[many] > by_nodes[few] for by_nodes in errors.values())
     return (
         f"**The volume alone does not make the force right.** If only the total volume of a ball or liver is "
-        f"kept, the force of tetrahedral bodies is {_range(filled)} % too small, and that of the surface bodies of "
-        f"Jung "
-        f"et al. {_range(surface)} % ([forces](results/published/volume_loss/force.png))."
+        f"kept, the force of tetrahedral bodies with {many} surface nodes is {_range(filled)} % too small, and that of "
+        f"the surface bodies of Jung et al. {_range(surface)} %. More nodes do not cure it: from {few} to {many} the "
+        f"error grows in {grown} of {len(errors)} cases ([forces](results/published/volume_loss/force.png))."
     )
 
 
 def recommended(published: Path) -> str:
-    """In how many scenes a body is accurate enough, how fast these are, and where none is."""
-    speeds, missed = _chosen(published)
+    """In how many scenes a body is accurate enough and how sure that is, how fast these are, and where none is."""
+    chosen, missed = _chosen(published)
+    alone = [f"{scene} ({', '.join(_errors(choice))})" for scene, choice in chosen.items() if len(_errors(choice)) == 1]
     return (
         f"**Bodies of quadratic tetrahedra that keep one volume per vertex are accurate without fitted springs.** In "
-        f"{len(speeds)} of {len(speeds) + len(missed)} scenes one of them, uniform or adaptive (finer where strains "
-        f"are large), is [accurate enough](docs/accuracy.md#accurate-enough) on each of five neighbouring meshes; we "
-        f"compare the largest error with the target and ignore the uncertainty of the reference. Those bodies are "
-        f"{_range(speeds.values(), 1)} times as fast as real time on one core. The rest: "
+        f"{len(chosen)} of {len(chosen) + len(missed)} scenes one of them, uniform or adaptive (finer where strains "
+        f"are large), is [accurate enough](docs/accuracy.md#accurate-enough) on each of five neighbouring meshes, at "
+        f"{_range(map(_speed, chosen.values()), 1)} times real time on one core. {_close(chosen)} Only one error can "
+        f"be compared in {' and '.join(alone) or 'no scene'}. The rest: "
         f"{'; '.join(missed) or 'none'}."
     )
 
 
 def exceptions(published: Path) -> str:
     """The scenes in which no body is accurate enough."""
-    speeds, missed = _chosen(published)
+    chosen, missed = _chosen(published)
     return (
-        f"**In {len(missed)} of {len(speeds) + len(missed)} scenes no body is shown to be [accurate "
-        f"enough](docs/accuracy.md#accurate-enough)**: {'; '.join(missed) or 'none'}. Elsewhere we compare the error "
-        f"with the target and ignore the uncertainty of the reference."
+        f"**In {len(missed)} of {len(chosen) + len(missed)} scenes no body is shown to be [accurate "
+        f"enough](docs/accuracy.md#accurate-enough)**: {'; '.join(missed) or 'none'}. {_close(chosen)}"
     )
 
 
 def shapes(published: Path) -> str:
     """The bodies that do not keep the shape of their organ."""
-    rows = [row for row in table(published, ACCURACY.name) if row["method"] == OURS]
+    everything = table(published, ACCURACY.name)
+    rows = [row for row in everything if row["method"] == OURS]
+    foreign = [row for row in everything if row["method"] == "implicit_elements"]
     flat = [-change for change in column((row for row in rows if "quadratic" not in row["body"]), "shape_volume [%]")]
     off = {
         f"{row['scene']} with {row['nodes']} nodes ({row['shape_error [%]']:.1f} %)": None
@@ -182,9 +198,11 @@ def shapes(published: Path) -> str:
         if "quadratic" in row["body"] and row["shape_error [%]"] > SHAPE
     }
     return (
-        f"**Some bodies differ from the shape of their organ even at rest** and are never recommended. Our bodies "
-        f"with flat sides lack {_range(flat, 1)} % of the volume. These quadratic bodies are farther than {SHAPE:g} % "
-        f"of the organ's size from the true surface: {', '.join(off) or 'none'}."
+        f"**Some bodies differ from the shape of their organ even at rest** and are never recommended. In the study "
+        f"`accuracy` our bodies with flat sides lack {_range(flat, 1)} % of the volume. The coarse bodies of "
+        f"*implicit_elements*, for comparison, lack up to {-min(column(foreign, 'shape_volume [%]')):.1f} % and are up "
+        f"to {max(column(foreign, DISTANCE)):.1f} % of the organ's size from the true surface. These of our quadratic "
+        f"bodies are farther than {SHAPE:g} % from it: {', '.join(off) or 'none'}."
     )
 
 
@@ -196,25 +214,41 @@ def inverted(published: Path) -> str:
 
 
 def random_organs(published: Path) -> str:
-    """How far off the finest body is on 95 of 100 organs of a population."""
-    populations, nodes = _populations(published), _sizes(published)[-1]
-    counts = ", ".join(f"{len(members[nodes])} {organ}s" for organ, members in populations.items())
-    bounds, speeds, missed = [], [], 0
-    for organ, members in populations.items():
-        force, mean = (_bound(members[nodes], name, digits) for name, digits in ((FORCE, ".1f"), (MEAN, ".2g")))
-        bounds.append(f"{organ} {force} and {mean}" if force else f"{organ} {mean}")
-        speeds += [1.0 / speed for speed in column(members[nodes], SPEED)]
-        missed += sum(_misses(organ, row) for row in members[nodes])
-    finest = [row for members in populations.values() for row in members[nodes]]
-    bars = [max(column(finest, name.replace(" [", " floor ["))) for name in (FORCE, MEAN)]
+    """How far off the finest body is on 95 of 100 organs of a population, as a table."""
+    populations, (*_, coarser, nodes) = _populations(published), _sizes(published)
+    finest = {organ: members[nodes] for organ, members in populations.items()}
+    everyone = [row for rows in finest.values() for row in rows]
+    bars = [max(column(everyone, _floor(name))) for name in (FORCE, MEAN)]
+    missed = {organ: _missed(organ, members[coarser]) for organ, members in populations.items()}
+    fewer = " and ".join(f"{count} {organ}s" for organ, count in missed.items() if count)
+    rows = "\n".join(_organ_row(organ, rows) for organ, rows in finest.items())
     return (
-        f"**Random organs** ({counts}; lengths, wall, load and, in solid organs, stiffness are random): the 95th "
-        f"percentile of the error in force and mean displacement of adaptive bodies with {nodes:,} surface nodes is, "
-        f"with the upper end of its 95 % interval, {', '.join(bounds)} % (no probe, no force; references within "
-        f"{bars[0]:.1f} and {bars[1]:.1f} %). On one mesh each, {missed} of {len(finest)} miss their target (3 and "
-        f"1 %, hollow organs 6 and 3 %) or fail. A simulated second of one member of each organ takes "
-        f"{_range(speeds, 1)} s on one core ([random organs](docs/population.md))."
+        f"**Random organs**: lengths, wall, load and, in solid organs, stiffness are random. The table gives the 95th "
+        f"percentile of the error of adaptive bodies with {nodes:,} surface nodes, on one mesh each (references within "
+        f"{bars[0]:.1f} and {bars[1]:.1f} %; without a probe there is no force). In brackets: the upper end of its "
+        f"resampled 95 % interval, which is too low for so few members. With {coarser:,} nodes {fewer or 'none'} miss "
+        f"a target or fail. A simulated second of one member of each organ takes "
+        f"{_range((1.0 / speed for speed in column(everyone, SPEED)), 1)} s on one core ([random "
+        f"organs](docs/population.md)).\n\n"
+        f"| organ | force [%] | mean displacement [%] | targets [%] | miss or fail | reference cannot decide |\n"
+        f"|---|---|---|---|---|---|\n{rows}\n"
     )
+
+
+def _organ_row(organ: str, rows: Sequence[Row]) -> str:
+    """The line of an organ in the table of random organs."""
+    wish, force = usual_wish(RANGES[organ].scene), _bound(rows, FORCE, ".1f")
+    targets = f"{wish.force:g}, {wish.displacement:g}" if force else f"–, {wish.displacement:g}"
+    unsure = sum(_is_undecided(organ, row) for row in rows)
+    return (
+        f"| {organ} | {force or '–'} | {_bound(rows, MEAN, '.2g')} | {targets} | {_missed(organ, rows)} of {len(rows)} "
+        f"| {unsure} |"
+    )
+
+
+def _missed(organ: str, rows: Iterable[Row]) -> int:
+    """How many members miss a target or fail."""
+    return sum(_misses(organ, row) for row in rows)
 
 
 def other_organs(published: Path) -> list[str]:
@@ -222,14 +256,14 @@ def other_organs(published: Path) -> list[str]:
     populations, lines = _populations(published), []
     for nodes in _sizes(published):
         missed = [
-            f"{sum(_misses(organ, row) for row in members[nodes])} of {len(members[nodes])} {organ}s"
+            f"{_missed(organ, members[nodes])} of {len(members[nodes])} {organ}s"
             for organ, members in populations.items()
         ]
         lines.append(f"with {nodes:,} nodes {', '.join(missed)}")
     return [
-        f"**On other organs an error can be larger.** Of random organs these miss their target (force 3 %, mean "
-        f"displacement 1 %; stomach and bladder 6 and 3 %) or fail: {'; '.join(lines)} ([random "
-        f"organs](docs/population.md))."
+        f"**On other organs an error can be larger.** Of random organs these miss a target (force 3 %, mean "
+        f"displacement 1 %; stomach and bladder 6 and 3 %; shape {SHAPE:g} % of the size) or fail: {'; '.join(lines)} "
+        f"([random organs](docs/population.md))."
     ]
 
 
@@ -257,16 +291,32 @@ def _bound(rows: Sequence[Row], name: str, digits: str) -> str:
 
 
 def _misses(organ: str, row: Row) -> bool:
-    """Whether the run of a member failed, or one of its errors is beyond its target or not known."""
+    """Whether the run of a member failed, or one of its errors or its shape is beyond its target or not known."""
+    failed = row["status"] != Status.OK or row[MEAN] != row[MEAN]
+    return failed or row[DISTANCE] > SHAPE or _is_beyond(organ, row, 0)
+
+
+def _is_undecided(organ: str, row: Row) -> bool:
+    """Whether the uncertainty of the reference leaves open if a member misses its target."""
+    return _is_beyond(organ, row, 1) and not _is_beyond(organ, row, -1)
+
+
+def _is_beyond(organ: str, row: Row, sign: int) -> bool:
+    """Whether an error of a member, plus `sign` times the uncertainty of its reference, is beyond its target."""
     wish = usual_wish(RANGES[organ].scene)
-    if row["status"] != Status.OK or row[MEAN] != row[MEAN]:
-        return True
-    return bool(abs(row[FORCE]) > wish.force or row[MEAN] > wish.displacement)
+    bounds = {FORCE: wish.force, MEAN: wish.displacement}
+    return any(abs(row[name]) + sign * row[_floor(name)] > bound for name, bound in bounds.items())
+
+
+def _floor(name: str) -> str:
+    """The column with the uncertainties of another one."""
+    return name.replace(" [", " floor [")
 
 
 def real_time(published: Path) -> list[str]:
     """In which scenes the recommended body is as fast as real time."""
-    speeds, _ = _chosen(published)
+    chosen, _ = _chosen(published)
+    speeds = {name: _speed(choice) for name, choice in chosen.items()}
     slow = [f"{name} reaches {speed:.1f} times real time" for name, speed in speeds.items() if speed < 1.0]
     return [
         f"**Real time holds for one organ on one core**, without drawing, in {len(speeds) - len(slow)} of the "
@@ -275,17 +325,41 @@ def real_time(published: Path) -> list[str]:
     ]
 
 
-def _chosen(published: Path) -> tuple[dict[str, float], list[str]]:
-    """Speed of the recommended body of each scene that has one [s/s]; the scenes without an accurate one, with why."""
-    speeds, missed = dict[str, float](), list[str]()
+def _chosen(published: Path) -> tuple[dict[str, Choice], list[str]]:
+    """The recommended body of each scene that has one; the scenes without an accurate one, with why."""
+    chosen, missed = dict[str, Choice](), list[str]()
     for scene in ACCURACY.scenes:
         choice = choice_of(scene, over_meshes(one for one in published_rows(published, scene) if one.compared))
         if choice is not None and choice.meets:
-            speeds[scene.name] = 1.0 / choice.body.cost.value
+            chosen[scene.name] = choice
         elif choice is not None:
             nearest = f"in {scene.name} the nearest body ({body_words(choice.body.case.body)} nodes)"
-            missed.append(f"{nearest} {_why_not(choice.body, choice.wish)}{_adaptive(published, scene.name)}")
-    return speeds, missed
+            missed.append(f"{nearest} {_why_not(choice)}{_adaptive(published, scene.name)}")
+    return chosen, missed
+
+
+def _speed(choice: Choice) -> float:
+    """Of the chosen body [s/s]."""
+    return 1.0 / choice.body.cost.value
+
+
+def _errors(choice: Choice) -> dict[str, tuple[Measured, float]]:
+    """Name of an error of the chosen body that is known and bounded -> the error, and its target [%]."""
+    body, wish = choice.body, choice.wish
+    pairs = {"force": (body.force, wish.force), "displacement": (body.displacement, wish.displacement)}
+    return {name: (error, bound) for name, (error, bound) in pairs.items() if bound and error.known}
+
+
+def _close(chosen: dict[str, Choice]) -> str:
+    """In which scenes the uncertainty of the reference reaches beyond the target."""
+    scenes = [
+        f"{scene} ({name} {abs(error.value):.2f} ± {error.uncertainty:.2f} %, target {bound:g} %)"
+        for scene, choice in chosen.items()
+        for name, (error, bound) in _errors(choice).items()
+        if abs(error.value) + error.uncertainty > bound
+    ]
+    where = " and ".join(scenes) or "no scene"
+    return f"In {where} the uncertainty of the reference reaches beyond the target."
 
 
 def _adaptive(published: Path, scene: str) -> str:
@@ -295,20 +369,19 @@ def _adaptive(published: Path, scene: str) -> str:
     sound = [row for row in adaptive if row["status"] == Status.OK]
     if not sound:
         return ""
-    off, bar = column(sound, MEAN), max(column(sound, MEAN.replace(" [", " floor [")))
+    off, bar = column(sound, MEAN), max(column(sound, _floor(MEAN)))
     return f" ({len(sound)} of {len(adaptive)} adaptive bodies end well and are {_range(off, 1)} ± {bar:.1f} % off)"
 
 
-def _why_not(one: Judged, wish: Wish) -> str:
+def _why_not(choice: Choice) -> str:
     """Which error misses its target, or which cannot be decided."""
-    errors = {"force": (one.force, wish.force), "displacement": (one.displacement, wish.displacement)}
-    bounds = {name: (error, bound) for name, (error, bound) in errors.items() if bound and error.known}
-    for name, (error, bound) in bounds.items():
+    errors = _errors(choice)
+    for name, (error, bound) in errors.items():
         if error.uncertainty > bound and abs(error.value) - error.uncertainty <= bound:
             return f"is undecided, because its reference is only known to ±{error.uncertainty:.2g} % in {name}"
     missed = [
         f"misses the target of {bound:g} % for {name} with {abs(error.value):.3g} %"
-        for name, (error, bound) in bounds.items()
+        for name, (error, bound) in errors.items()
         if abs(error.value) > bound
     ]
     return " and ".join(missed) or "does not keep the shape of the organ at rest"
@@ -330,7 +403,7 @@ def cuts(published: Path) -> str:
         if distant
         else ""
     )
-    floors = {name: max(column(finest.values(), name.replace(" [", " floor ["))) for name in (OPENING, FORCE)}
+    floors = {name: max(column(finest.values(), _floor(name))) for name in (OPENING, FORCE)}
     return (
         f"**Organs can be cut.** In {len(gaping)} scenes, with adaptive bodies in real time, "
         f"the width of the cut is at most {max(off[OPENING]):.1f} % off and the force {max(off[FORCE]):.1f} % "
@@ -354,15 +427,20 @@ def other_programs(published: Path) -> str:
 
     swept = table(published, "league", "sweep")
     defaults = [abs(row[FORCE]) for row in swept if row["settings"] == "{}" and row["engine"] in LINEAR]
-    scenes = " and ".join(dict.fromkeys(row["scene"] for row in swept))
-    bar = max(column(rows, FORCE.replace(" [", " floor [")))
+    searched = " and ".join(dict.fromkeys(row["scene"] for row in swept))
+    bar = max(column(rows, _floor(FORCE)))
+    scenes = {row["scene"] for row in rows}
+    near = [row for row in table(published, ACCURACY.name) if row["scene"] in scenes and row["body"] == UNIFORM]
+    largest = [max(abs(value) for value in column(near, name)) for name in (FORCE, MEAN)]
     return (
-        f"**Other programs on the same coarse meshes** ({len({row['scene'] for row in rows})} scenes, {nodes} "
+        f"**Other programs on the same coarse meshes** ({len(scenes)} scenes, {nodes} "
         f"vertices, references within {bar:.1f} %, [league](docs/league.md)): errors in force and in mean displacement "
         f"are {off('felupe')} for FElupe's quadratic elements, {off('sfepy')} for SfePy's mixed ones, "
-        f"{off('ours-quadratic')} for our uniform quadratic body, {off(*LINEAR)} for linear tetrahedra of Bullet, "
-        f"Drake, MuJoCo and Newton. Settings were searched on {scenes}; with default settings linear tetrahedra "
-        f"are {_range(defaults)} % off in force there."
+        f"{off('ours-quadratic')} for our uniform quadratic body (on five neighbouring meshes up to {largest[0]:.1f} "
+        f"and {largest[1]:.1f} %), {off('ours-corotated', 'ours-xpbd')} for our linear elements (corotated, XPBD), "
+        f"{off(*LINEAR)} for linear tetrahedra of PyBullet, Drake, MuJoCo and Newton. Settings of the others were "
+        f"searched on {searched}; with default settings their linear tetrahedra are {_range(defaults)} % off in force "
+        f"there."
     )
 
 
@@ -464,7 +542,7 @@ SENTENCES = (
     Sentences(
         "docs/findings.md",
         "answers",
-        ("methods", "laws", "literature", *LEAGUE, "stress"),
+        ("methods", "laws", "literature", ACCURACY.name, *LEAGUE, "stress"),
         answers,
     ),
     Sentences("docs/limits.md", "limits", ("volume_loss", "accuracy"), limits),
