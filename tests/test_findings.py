@@ -275,7 +275,7 @@ def test_speeds_that_pages_quote():
     fast = f"{measured['stomach_slide: a 500 Hz update']:.2f}"
     assert f"| update at 1,000 Hz | {fast};" in paper and f"19,500 surface nodes was {fast} ms" in limits
     springs, triangles = re.findall(r"(\d+) (?:springs|triangles)", rows["note"]["stomach_slide, 19500 nodes: a step"])
-    assert f"{int(triangles):,}; {int(springs):,} springs" in paper
+    assert f"virtual, {int(triangles):,}; " in paper and f"101 virtual, {int(springs):,} springs" in paper
     assert f"{rows['note']['constraint on / off'].split()[-1]} in runs of their own" in paper
     frames = pd.read_csv(TABLES / "frame_rate" / "frame_rate.csv").set_index(["scene", "body", "nodes", "method"])
     steps = [
