@@ -4,8 +4,10 @@ import errno
 import io
 import os
 import sys
+import tempfile
+import traceback
 import warnings
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -18,6 +20,10 @@ from studies.cli.loading import Commands
 from studies.cli.terminal import errors, say
 
 app = typer.Typer(cls=Commands, no_args_is_help=True, pretty_exceptions_enable=False)
+UsageError: Any = typer.BadParameter.__mro__[1]
+"""What typer raises for words that fit no command: click's class, or a copy of it inside typer."""
+TRACEBACK = "ORGANBENCH_TRACEBACK"
+"""An environment variable for developers: set, an unforeseen error ends in its traceback."""
 
 
 def show_version(flag: bool) -> None:
@@ -58,9 +64,13 @@ def _exit_code() -> str | int | None:
     """Runs the command. Whatever came of it, once a signal came it counts as interrupted."""
     code: str | int | None = 0
     try:
-        app()
-    except SystemExit as stop:  # typer ends with it always, and turns KeyboardInterrupt into interrupts.CODE
+        code = app(standalone_mode=False) or 0  # typer turns KeyboardInterrupt into interrupts.CODE
+    except SystemExit as stop:
         code = stop.code
+    except UsageError as error:
+        if sys.argv[1:]:  # without words, the help was printed
+            complain(f"organbench: {misused(error)}")
+        code = 2
     except Exception as error:
         if not interrupts.pressed():
             complain(f"organbench: {message(error)}")
@@ -68,8 +78,15 @@ def _exit_code() -> str | int | None:
     return interrupts.exit_code() if interrupts.pressed() else code
 
 
+def misused(error: Any) -> str:
+    """The sentence for a UsageError, which names the option or argument."""
+    words = " ".join(error.format_message().split()).rstrip(".")
+    command = f"{error.ctx.info_name} " if error.ctx is not None and error.ctx.parent is not None else ""
+    return f"{words[:1].lower()}{words[1:]}; `organbench {command}--help` explains it"
+
+
 def message(error: Exception) -> str:
-    """The sentence for an error. Raises an unforeseen error again: a fault of this program keeps its traceback."""
+    """The sentence for an error."""
     if isinstance(error, (StudyError, MassSpringError, SolveError)):
         return str(error)
     from studies.runs.user_code import AGAIN, fault_of  # half a second, for an error alone
@@ -80,7 +97,26 @@ def message(error: Exception) -> str:
     # An error with a file name is not one of the terminal's.
     if isinstance(error, OSError) and error.filename is None and error.errno in (errno.ENOSPC, errno.EIO, errno.EBADF):
         return unwritten(error)
-    raise error
+    if isinstance(error, typer.Abort):
+        return "the question has no answer; give it as an option"
+    return unforeseen(error)
+
+
+def unforeseen(error: Exception) -> str:
+    """The sentence for a fault of this program, whose traceback goes to a file; raises it again if TRACEBACK is set."""
+    if os.environ.get(TRACEBACK):
+        raise error
+    first = str(error).strip().split("\n")[0]
+    what = f"failed unexpectedly: {type(error).__name__}" + (f": {first}" if first else "")
+    text = "".join(traceback.format_exception(error))
+    try:
+        handle, path = tempfile.mkstemp(prefix="organbench-traceback-", suffix=".txt")
+        with open(handle, "w", encoding="utf-8", errors="backslashreplace") as file:
+            file.write(text)
+    except OSError:
+        complain(text)
+        return f"{what}; please report it with the lines above"
+    return f"{what}; the traceback is in {path}; please report it"
 
 
 def unwritten(error: OSError) -> str:

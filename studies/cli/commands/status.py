@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 from rich.table import Table
 
+from studies.base.errors import StudyError
 from studies.catalog import STUDIES
 from studies.cli.terminal import SMOKE, Results, Smoke, busy, console, say
 from studies.scene.scene import Scene
@@ -28,6 +29,10 @@ def status(
 ) -> None:
     """Count what is ok, failed, stale or missing, and say why."""
     chosen = [find_study(study)] if study else list(STUDIES)
+    if not results.is_dir():
+        raise StudyError(
+            f"there is no folder {results}: nothing has run, or --results must name the folder of the results"
+        )
     if smoke:
         chosen, results = [entry.smoke() for entry in chosen], results / SMOKE
     own = [entry for entry in chosen if entry.word]  # those of the catalogue are tested
