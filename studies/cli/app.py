@@ -7,7 +7,7 @@ import sys
 import tempfile
 import traceback
 import warnings
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
@@ -20,8 +20,6 @@ from studies.cli.loading import Commands
 from studies.cli.terminal import errors, say
 
 app = typer.Typer(cls=Commands, no_args_is_help=True, pretty_exceptions_enable=False)
-UsageError: Any = typer.BadParameter.__mro__[1]
-"""What typer raises for words that fit no command: click's class, or a copy of it inside typer."""
 TRACEBACK = "ORGANBENCH_TRACEBACK"
 """An environment variable for developers: set, an unforeseen error ends in its traceback."""
 
@@ -64,25 +62,14 @@ def _exit_code() -> str | int | None:
     """Runs the command. Whatever came of it, once a signal came it counts as interrupted."""
     code: str | int | None = 0
     try:
-        code = app(standalone_mode=False) or 0  # typer turns KeyboardInterrupt into interrupts.CODE
-    except SystemExit as stop:
+        app()
+    except SystemExit as stop:  # typer ends with it always, and turns KeyboardInterrupt into interrupts.CODE
         code = stop.code
-    except UsageError as error:
-        if sys.argv[1:]:  # without words, the help was printed
-            complain(f"organbench: {misused(error)}")
-        code = 2
     except Exception as error:
         if not interrupts.pressed():
             complain(f"organbench: {message(error)}")
             code = 2
     return interrupts.exit_code() if interrupts.pressed() else code
-
-
-def misused(error: Any) -> str:
-    """The sentence for a UsageError, which names the option or argument."""
-    words = " ".join(error.format_message().split()).rstrip(".")
-    command = f"{error.ctx.info_name} " if error.ctx is not None and error.ctx.parent is not None else ""
-    return f"{words[:1].lower()}{words[1:]}; `organbench {command}--help` explains it"
 
 
 def message(error: Exception) -> str:
@@ -97,8 +84,6 @@ def message(error: Exception) -> str:
     # An error with a file name is not one of the terminal's.
     if isinstance(error, OSError) and error.filename is None and error.errno in (errno.ENOSPC, errno.EIO, errno.EBADF):
         return unwritten(error)
-    if isinstance(error, typer.Abort):
-        return "the question has no answer; give it as an option"
     return unforeseen(error)
 
 

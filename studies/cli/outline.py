@@ -14,7 +14,7 @@ Rows = list[tuple[str, str]]
 
 
 def studies() -> Rows:
-    """(name, question) of each of STUDIES, the name of its module and the first paragraph there, and of the population."""
+    """(name, question) of each of STUDIES, the name of its module and its first paragraph, and of the population."""
     modules = [module for module, _ in _registered("studies.catalog", "STUDIES")]
     rows = [(module.rsplit(".", 1)[1], _summary(_parsed(module))) for module in modules]
     return [*rows, ("population", _summary(_parsed("studies.catalog.population.study")))]
@@ -28,8 +28,8 @@ def methods() -> Rows:
 
 
 def metrics() -> Rows:
-    """(name, first paragraph) of each of METRICS: calls of a name, a unit, a direction and a function, which is of the same
-    module or, as cutting.cut_ms, of one next to it."""
+    """(name, first paragraph) of each of METRICS: calls of a name, a unit, a direction and a function, which is of
+    the same module or, as cutting.cut_ms, of one next to it."""
     package = "studies.metrics"
     tree = _parsed(f"{package}.metrics")
     calls = [item.args for item in _assigned(tree, "METRICS").elts]
