@@ -12,6 +12,7 @@ from studies.catalog import STUDIES
 from studies.cli.terminal import SMOKE, Results, Smoke, busy, console, say
 from studies.scene.scene import Scene
 from studies.store.ledger import Ledger
+from studies.store.paths import study_folder
 from studies.sweep.find_study import find_study
 from studies.sweep.job import reference_jobs
 from studies.sweep.standings import Standing, machines_of, mixture, standing_of, standings, summary
@@ -28,11 +29,7 @@ def status(
     check: Annotated[bool, typer.Option(help="verify the checksums of all files, not only changed ones")] = False,
 ) -> None:
     """Count what is ok, failed, stale or missing, and say why."""
-    chosen = [find_study(study)] if study else list(STUDIES)
-    if not results.is_dir():
-        raise StudyError(
-            f"there is no folder {results}: nothing has run, or --results must name the folder of the results"
-        )
+    chosen, root = [find_study(study)] if study else list(STUDIES), results
     if smoke:
         chosen, results = [entry.smoke() for entry in chosen], results / SMOKE
     own = [entry for entry in chosen if entry.word]  # those of the catalogue are tested
@@ -41,6 +38,9 @@ def status(
 
         for entry in own:
             check_columns(entry.columns)
+            study_folder(results, entry.name)  # raises for what names no folder
+    if not root.is_dir():
+        raise StudyError(f"there is no folder {root}: run `organbench run` first, or name the folder by --results")
     ledger = Ledger(results, check)
     for entry in chosen:
         with busy(f"checking {entry.name}"):
