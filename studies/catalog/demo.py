@@ -12,12 +12,15 @@ DEMO = Study(
     name="demo",
     question="What do a kept volume and quadratic elements change on a squeezed ball?",
     cases=(
-        Case(BALL_SQUEEZE, BALL, Free(), recorded=("surface",)),
-        Case(BALL_SQUEEZE, BALL, ImplicitVolume(), recorded=("surface",)),
-        Case(BALL_SQUEEZE, RECOMMENDED, ImplicitVolume(), dt_fraction=0.8, recorded=("surface",)),
+        Case(BALL_SQUEEZE, BALL, Free(), timed=True, recorded=("surface",)),
+        Case(BALL_SQUEEZE, BALL, ImplicitVolume(), timed=True, recorded=("surface",)),
+        Case(BALL_SQUEEZE, RECOMMENDED, ImplicitVolume(), dt_fraction=0.8, timed=True, recorded=("surface",)),
     ),
-    charts=(Chart("squeeze.png", "studies.plots.squeeze:draw"),),
-    columns=("volume_worst", "force_end", "shape_error", "shape_volume"),
+    charts=(
+        Chart("squeeze.png", "studies.plots.squeeze:draw"),
+        Chart("force.png", "studies.plots.force_path:draw"),
+    ),
+    columns=("volume_worst", "force_end", "shape_error", "shape_volume", "real_time"),
 )
 WORDS = ("springs alone", "one kept volume", "recommended body")
 """What each case is called on the terminal."""

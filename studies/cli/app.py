@@ -4,6 +4,8 @@ import errno
 import io
 import os
 import sys
+import tempfile
+import traceback
 import warnings
 from typing import Annotated
 
@@ -18,6 +20,8 @@ from studies.cli.loading import Commands
 from studies.cli.terminal import errors, say
 
 app = typer.Typer(cls=Commands, no_args_is_help=True, pretty_exceptions_enable=False)
+TRACEBACK = "ORGANBENCH_TRACEBACK"
+"""An environment variable for developers: set, an unforeseen error ends in its traceback."""
 
 
 def show_version(flag: bool) -> None:
@@ -69,7 +73,7 @@ def _exit_code() -> str | int | None:
 
 
 def message(error: Exception) -> str:
-    """The sentence for an error. Raises an unforeseen error again: a fault of this program keeps its traceback."""
+    """The sentence for an error."""
     if isinstance(error, (StudyError, MassSpringError, SolveError)):
         return str(error)
     from studies.runs.user_code import AGAIN, fault_of  # half a second, for an error alone
@@ -80,7 +84,24 @@ def message(error: Exception) -> str:
     # An error with a file name is not one of the terminal's.
     if isinstance(error, OSError) and error.filename is None and error.errno in (errno.ENOSPC, errno.EIO, errno.EBADF):
         return unwritten(error)
-    raise error
+    return unforeseen(error)
+
+
+def unforeseen(error: Exception) -> str:
+    """The sentence for a fault of this program, whose traceback goes to a file; raises it again if TRACEBACK is set."""
+    if os.environ.get(TRACEBACK):
+        raise error
+    first = str(error).strip().split("\n")[0]
+    what = f"failed unexpectedly: {type(error).__name__}" + (f": {first}" if first else "")
+    text = "".join(traceback.format_exception(error))
+    try:
+        handle, path = tempfile.mkstemp(prefix="organbench-traceback-", suffix=".txt")
+        with open(handle, "w", encoding="utf-8", errors="backslashreplace") as file:
+            file.write(text)
+    except OSError:
+        complain(text)
+        return f"{what}; please report it with the lines above"
+    return f"{what}; the traceback is in {path}; please report it"
 
 
 def unwritten(error: OSError) -> str:

@@ -1,6 +1,7 @@
 """The commands: their groups and lines for `--help`, and the loading of the one that is called."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, nullcontext
 from importlib import import_module
 from typing import Annotated, Any, NamedTuple
 
@@ -102,6 +103,32 @@ class Commands(TyperGroup):
             raise StudyError(f"the command '{name}' is now '{RENAMED[name]}': run `organbench {RENAMED[name]}`")
         lookup(name, COMMANDS, "command")
         return name, loaded(name), rest
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """The options before a command. Raises StudyError; without words it prints the help."""
+        with usage_as_sentence() if args else nullcontext():
+            return super().parse_args(ctx, args)
+
+    def invoke(self, ctx: Any) -> Any:
+        """Reads the words of the command and runs it. Raises StudyError for words that do not fit it."""
+        with usage_as_sentence():
+            return super().invoke(ctx)
+
+
+UsageError: Any = typer.BadParameter.__mro__[1]
+"""What typer raises for words that do not fit: click's class, or the copy of it in newer versions of typer."""
+
+
+@contextmanager
+def usage_as_sentence() -> Iterator[None]:
+    """Inside, a UsageError is a StudyError, whose sentence names the option or argument."""
+    try:
+        yield
+    except UsageError as error:
+        words = " ".join(error.format_message().split()).rstrip(".")
+        command = f"{error.ctx.info_name} " if error.ctx is not None and error.ctx.parent is not None else ""
+        sentence = f"{words[:1].lower()}{words[1:]}; `organbench {command}--help` lists the options"
+        raise StudyError(sentence) from error
 
 
 def loaded(name: str) -> Any:

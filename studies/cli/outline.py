@@ -1,4 +1,4 @@
-"""Names and first lines, read from the sources: importing what `organbench list` shows takes longer than a second.
+"""Names and descriptions, read from the sources: importing what `organbench list` shows takes longer than a second.
 
 A test holds them equal to what the modules say.
 """
@@ -14,30 +14,30 @@ Rows = list[tuple[str, str]]
 
 
 def studies() -> Rows:
-    """(name, question) of each of STUDIES, the name of its module and the first line there, and of the population."""
+    """(name, question) of each of STUDIES, the name of its module and its first paragraph, and of the population."""
     modules = [module for module, _ in _registered("studies.catalog", "STUDIES")]
-    rows = [(module.rsplit(".", 1)[1], _first_line(_parsed(module))) for module in modules]
-    return [*rows, ("population", _first_line(_parsed("studies.catalog.population.study")))]
+    rows = [(module.rsplit(".", 1)[1], _summary(_parsed(module))) for module in modules]
+    return [*rows, ("population", _summary(_parsed("studies.catalog.population.study")))]
 
 
 def methods() -> Rows:
-    """(name, first line) of each of METHODS and of LITERATURE."""
+    """(name, first paragraph) of each of METHODS and of LITERATURE."""
     homes = [home for registry in ("METHODS", "LITERATURE") for home in _registered("massspring.methods", registry)]
     classes = [_defined(_parsed(module), name) for module, name in homes]
-    return [(_assigned(one, "name").value, _first_line(one)) for one in classes]
+    return [(_assigned(one, "name").value, _summary(one)) for one in classes]
 
 
 def metrics() -> Rows:
-    """(name, description) of each of METRICS: calls of a name, a unit, a direction and a function, which is of the same
-    module or, as cutting.cut_ms, of one next to it."""
+    """(name, first paragraph) of each of METRICS: calls of a name, a unit, a direction and a function, which is of
+    the same module or, as cutting.cut_ms, of one next to it."""
     package = "studies.metrics"
     tree = _parsed(f"{package}.metrics")
     calls = [item.args for item in _assigned(tree, "METRICS").elts]
 
     def documented(function: Any) -> str:
         if isinstance(function, ast.Attribute):
-            return _first_line(_defined(_parsed(f"{package}.{ast.unparse(function.value)}"), function.attr))
-        return _first_line(_defined(tree, function.id))
+            return _summary(_defined(_parsed(f"{package}.{ast.unparse(function.value)}"), function.attr))
+        return _summary(_defined(tree, function.id))
 
     return [(name.value, documented(function)) for name, _, _, function, *_ in calls]
 
@@ -66,5 +66,6 @@ def _parsed(module: str) -> ast.Module:
     return ast.parse((path / "__init__.py" if path.is_dir() else path.with_suffix(".py")).read_bytes())
 
 
-def _first_line(node: Any) -> str:
-    return (ast.get_docstring(node) or "").strip().split("\n")[0]
+def _summary(node: Any) -> str:
+    """The first paragraph of the docstring."""
+    return " ".join((ast.get_docstring(node) or "").split("\n\n")[0].split())

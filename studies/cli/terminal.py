@@ -43,7 +43,7 @@ errors = VisibleConsole(stderr=True, soft_wrap=True)
 
 
 def _results_folder(path: Path) -> Path:
-    if path.is_file():
+    if path.exists() and not path.is_dir():
         raise StudyError(f"{path} is a file; give the folder of the results (--results)")
     return path
 

@@ -92,7 +92,9 @@ def charts_and_tables(ledger: Ledger, studies: Sequence[Study]) -> tuple[list[Pa
         paths, missing = refresh(ledger, study, references)
         written += paths
         remarks += [f"{study.name}: {sentence}" for sentence in missing]
-    written += refresh_uncertainty(references, [scene for study in studies for scene in study.scenes])
+    # Not of studies that were never run here: the published references of all scenes take a minute to read and measure.
+    present = [study for study in studies if study.name not in absent]
+    written += refresh_uncertainty(references, [scene for study in present for scene in study.scenes])
     kept = kept_volumes(ledger, studies)
     if len(kept):
         written.append(write_table(root / "kept_volume.csv", kept))

@@ -19,7 +19,7 @@ from studies.geometry import {region}
 from studies.scene.placing import along, press_times, scaled
 from studies.scene.tissues import {tissue}
 
-FILE = Path(__file__).parent / "{file}"
+FILE = {file}
 POINT = {point}  # m, on the surface
 NORMAL = {normal}  # outward
 RADIUS, DEPTH, GAP = {radius}, {depth}, {gap}  # m, of the probe
@@ -47,7 +47,7 @@ SCENE = Scene(
     reference=ReferencePlan(),
 )
 CASES = (
-    # One volume, which the paper keeps: quick, but its force is about a third too small.
+    # One volume, which the paper keeps: quick, but inaccurate (docs/findings.md, the paper's body).
     Case(SCENE, BodyRecipe("tetrahedral", {nodes}), ImplicitVolume(), recorded=("surface",)),
 {recommended})
 CHARTS = (
@@ -58,7 +58,8 @@ CHARTS = (
 COLUMNS = ("force_end", "mean_error", "shape_error", "shape_volume", "volume_worst")
 STUDY = Study("{name}", "How near are these bodies to the reference?", CASES, CHARTS, COLUMNS)
 '''
-RECOMMENDED = """    # What `organbench advise` recommends: the worst errors that it had in {alike}.
+RECOMMENDED = """    # What `organbench advise` recommends. Its worst errors in {alike}:
+    # {errors}.
     Case(
         SCENE,
         {body},
@@ -79,6 +80,8 @@ class Recommended:
     """Time step over the stability limit."""
     alike: tuple[str, ...]
     """Scenes in which it was measured."""
+    errors: str
+    """The worst there, in words."""
 
 
 def scene_text(
@@ -100,11 +103,11 @@ def scene_text(
     second = ""
     if recommended is not None:
         names = " and ".join(recommended.alike)
-        second = RECOMMENDED.format(body=recommended.body, dt_fraction=recommended.dt_fraction, alike=names)
+        second = RECOMMENDED.format(**vars(recommended) | {"alike": names})
     return TEXT.format(
         name=python_name(stem_of(path)),
         where=proposal.held_where,
-        file=relative(path, folder),
+        file=file_in_python(path, folder),
         point=proposal.palpation.point,
         normal=proposal.palpation.normal,
         radius=radius,
@@ -131,10 +134,17 @@ def organ_options(source: Source, how: Mapping[str, object]) -> dict[str, object
     return {key: value for key, value in (given | dict(how)).items() if value not in (None, False, 0.0)}
 
 
-def relative(path: Path, folder: Path) -> str:
-    """The path relative to the folder if it lies below it; else the whole path."""
+def file_in_python(path: Path, folder: Path) -> str:
+    """The path as Python in a scene file: relative to its folder for a file below it, else whole."""
     path, folder = path.resolve(), folder.resolve()
-    return path.relative_to(folder).as_posix() if path.is_relative_to(folder) else path.as_posix()
+    if not path.is_relative_to(folder):
+        return f"Path({quoted(path.as_posix())})"
+    return f"Path(__file__).parent / {quoted(path.relative_to(folder).as_posix())}"
+
+
+def quoted(text: str) -> str:
+    """A text of one line as Python."""
+    return json.dumps(text, ensure_ascii=False)
 
 
 def python_name(stem: str) -> str:

@@ -16,6 +16,7 @@ from studies.base.atomic import is_there
 from studies.base.errors import DamagedFile, OtherVersion, StudyError
 
 AGAIN = "delete it, or run its study again, which replaces it"
+SUFFIX = ".h5"
 SIGNATURE = b"\x89HDF\r\n\x1a\n"
 FORMAT = ("v110", "v110")
 """Of HDF5: the first that can hold the views of studies.store.vtk_group."""
@@ -54,7 +55,12 @@ def check_seal(path: Path) -> None:
         )
     is_hdf5 = former or head.startswith(SIGNATURE)
     what = "is cut off or damaged" if is_hdf5 else "is not an HDF5 file, or was cut off"
-    raise DamagedFile(f"{path} {what} ({size} bytes): {AGAIN}")
+    raise DamagedFile(f"{path} {what} ({size} bytes): {advice(path)}")
+
+
+def advice(path: Path) -> str:
+    """What to do about a file that cannot be read; a file by another name may be anything, such as a table."""
+    return AGAIN if path.suffix == SUFFIX else f"give a results file, whose name ends in {SUFFIX}"
 
 
 @contextmanager
@@ -65,7 +71,7 @@ def open_results(path: Path) -> Iterator[h5py.File]:
     a broken seal and any error of the library.
     """
     path = Path(path)
-    if path.suffix == ".h5" and is_there(path) and not path.is_file():
+    if path.suffix == SUFFIX and is_there(path) and not path.is_file():
         raise DamagedFile(f"{path} is not a file: delete it, and run its study again")
     if not is_there(path) or not path.is_file():
         raise StudyError(f"there is no results file {path}: `organbench status` says which cases are stored")
@@ -78,7 +84,7 @@ def open_results(path: Path) -> Iterator[h5py.File]:
     except PermissionError as problem:
         raise StudyError(f"{path} may not be read by this user: change its permissions") from problem
     except Exception as problem:  # a file sealed by others brings HDF5, h5py and numpy to errors of every type
-        raise DamagedFile(f"{path} is cut off or damaged: {AGAIN}") from problem
+        raise DamagedFile(f"{path} is cut off or damaged: {advice(path)}") from problem
 
 
 def _without_lock(path: Path) -> h5py.File:

@@ -57,6 +57,7 @@ def no_tables(monkeypatch, tmp_path):
 def organbench(monkeypatch, capsys):
     """Calls the command line as the shell does: (exit code, standard output, standard error)."""
     monkeypatch.setattr(warnings, "showwarning", warnings.showwarning)  # main() sets it; give it back afterwards
+    monkeypatch.setenv(cli.TRACEBACK, "1")  # an unforeseen error fails the test where it is raised
 
     def call(*words):
         monkeypatch.setattr(sys, "argv", ["organbench", *map(str, words)])

@@ -60,7 +60,7 @@ def mesh(
         refuse_file_options(given | {"--scale": scale != 1.0, "--longest-side": longest_side, "--part": part})
 
         def make(count: int | None) -> Made:
-            mesh = synthetic(name, count or NODES, seed, wall, filled, exact=order == 1)
+            mesh = synthetic(name, NODES if count is None else count, seed, wall, filled, exact=order == 1)
             return Made(mesh, following(mesh, None) if order == 2 else None)
     else:
         file = settled(source_of(source, unit, scale, longest_side, part), yes)
@@ -68,7 +68,8 @@ def mesh(
 
         def make(count: int | None) -> Made:
             mesh = scan(file, count, fill=filled, on_shape=order == 2, **how)
-            return Made(mesh, following(mesh, true_shape_of(file, **how) if count else None) if order == 2 else None)
+            shape = true_shape_of(file, **how) if count is not None and order == 2 else None
+            return Made(mesh, following(mesh, shape) if order == 2 else None)
 
     with working(f"meshing {name or (source and source.name)}"):
         made = make(nodes)
@@ -78,7 +79,7 @@ def mesh(
         say(line)
     if source is None:
         say(closeness(made, Organ(name, made.mesh.recipe["parameters"]), make))
-    elif nodes:
+    elif nodes is not None:
         sized_file = file if file.longest_side is not None else replace(file, unit=made.mesh.recipe["unit"])
         say(closeness(made, Organ("file", organ_options(sized_file, how)), make))
     say(f"{summary(made)}; written to {output} in {NAMES[write_unit]}")

@@ -14,6 +14,7 @@ from studies.cli.mesh_files import LongestSide, Part, Scale, Unit, Yes, settled,
 from studies.cli.terminal import say, warn
 from studies.geometry import BallRegion, scan
 from studies.geometry.files.units import Source, stem_of
+from studies.metrics.cells import value_cell
 from studies.plots.place import draw_placing
 from studies.scene.chosen_place import RADIUS, SIDES, place_of
 from studies.scene.proposal import Proposal, proposal
@@ -60,9 +61,9 @@ def place(
     if source.longest_side is None:
         source = replace(source, unit=mesh.recipe["unit"])  # a scene says it, also where the file does
     placing = proposal(mesh, held, probed)
-    if tissue is None:
-        modulus = 1e-3 * TISSUES[name].shear_modulus
-        say(f"tissue: {name} ({modulus:g} kPa), as the file is called; --tissue names another")
+    by_name = ", as the file is called; --tissue names another" if tissue is None else ""
+    say(f"tissue: {name}, shear modulus {1e-3 * TISSUES[name].shear_modulus:g} kPa{by_name}")
+    say(f"  source: {TISSUES[name].source}")
     for line in lines_of(placing):
         say(line)
     answer = answer_for(source, placing, name)
@@ -105,13 +106,14 @@ def second_body(answer: Advice | None) -> Recommended | None:
     """The recommended body, which is printed with its errors."""
     if answer is None or answer.chosen is None:
         return None
-    case = answer.chosen.case
-    errors = f"force {answer.chosen.force.value:+.2g} %, displacement {answer.chosen.displacement.value:.2g} %"
+    case, force, displacement = answer.chosen.case, answer.chosen.force, answer.chosen.displacement
+    errors = f"force {value_cell(force.value, force.uncertainty, signed=True)} %, "
+    errors += f"displacement {value_cell(displacement.value, displacement.uncertainty)} %"
     near = "" if answer.meets else ", closest to the default target"
     alike = answer.alike or (answer.scene.name,)
     say(f"bodies: tetrahedral of one volume; {case.body.series}, {case.body.nodes} nodes (recommended{near})")
     say(f"  worst errors of the recommended one in {' and '.join(alike)}: {errors}")
-    return Recommended(body_in_python(case.body), case.dt_fraction, alike)
+    return Recommended(body_in_python(case.body), case.dt_fraction, alike, errors)
 
 
 def minutes(answer: Advice | None) -> float:

@@ -24,6 +24,7 @@ from studies.store.entry import MISSING
 from studies.store.ledger import Ledger
 from studies.store.links import link_study
 from studies.store.paths import study_folder
+from studies.store.schema import Status
 from studies.sweep.engines.choose import WORDS, executor_for
 from studies.sweep.executor import Executor
 from studies.sweep.failures import Failures
@@ -75,6 +76,8 @@ def run(
     chosen, well = [_chosen(study, smoke, case) for study in find_studies(studies or [])], True
     todo = [study for study in chosen if not again and plan(ledger, study, _selection(ledger, study, rules))]
     for study in todo:
+        if dry:
+            _check_mesh_files(study)
         warn(check_study(study, drawn=not case))
     if todo and report and not (on or dry):
         _compile()
@@ -91,6 +94,16 @@ def run(
     if report and not dry:
         _report(ledger, chosen)
     _exit(well, failures, studies or [])
+
+
+def _check_mesh_files(study: Study) -> None:
+    """Raises StudyError for a mesh file that is missing, in a study that expects no failure."""
+    for scene in () if study.accepts(Status.FAILED) else study.scenes:
+        path = str(scene.organ.parameters.get("path", "")) if scene.organ.shape == "file" else ""
+        if path and not Path(path).is_file():
+            raise StudyError(
+                f"the cases of scene '{scene.name}' will fail: there is no mesh file {path}; check the name"
+            )
 
 
 def _compile() -> None:

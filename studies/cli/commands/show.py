@@ -19,6 +19,7 @@ from studies.store.ledger import Ledger
 from studies.store.opening import open_results
 from studies.store.paths import TIMING
 from studies.store.record import INDEX_KIND, Field, Record, Status, read_record
+from studies.store.schema import LAYOUTS
 
 REFERENCES = "reference"
 """Folder of the references, which belong to no study."""
@@ -33,7 +34,7 @@ def show(
     every: Annotated[bool, typer.Option("--all", help="also the case as JSON and the meaning of each field")] = False,
 ) -> None:
     """Show a results file: status, numbers, fields with units."""
-    console.print(describe(path, console.width, every))
+    console.print(describe(path, console.width, every), soft_wrap=False)  # long lines go on below
 
 
 def describe(path: Path, width: int = WIDE, every: bool = True) -> Tree:
@@ -56,7 +57,11 @@ def _record(path: Path, record: Record, width: int, every: bool) -> Tree:
         tree.add(Text("case " + record.key))
     if record.attributes:
         numbers = tree.add("attributes")
-        texts = [Text(f"{name} = {_number(value)}") for name, value in sorted(record.attributes.items())]
+        units = _units(record.kind)
+        texts = [
+            Text(f"{name} = {_number(value)} {units.get(name, '')}".rstrip())
+            for name, value in sorted(record.attributes.items())
+        ]
         numbers.add(Columns(texts, padding=(0, 3), column_first=True))
     if record.fields:
         tree.add(_table(record.fields, width))
@@ -102,6 +107,12 @@ def _range(values: np.ndarray) -> tuple[str, str, str]:
         return "", "", ""
     low, high, last = (f"{float(value):.4g}" for value in (finite.min(), finite.max(), finite[-1]))
     return low, high, last if values.ndim <= 1 else ""
+
+
+def _units(kind: str) -> dict[str, str]:
+    """Of the attributes of a kind of record that have one."""
+    _, attributes = LAYOUTS.get(kind, ({}, {}))
+    return {name: spec.unit for name, spec in attributes.items() if spec.unit != "1"}
 
 
 def _number(value: object) -> str:

@@ -7,10 +7,12 @@ from typing import Annotated
 import typer
 from rich.table import Table
 
+from studies.base.errors import StudyError
 from studies.catalog import STUDIES
 from studies.cli.terminal import SMOKE, Results, Smoke, busy, console, say
 from studies.scene.scene import Scene
 from studies.store.ledger import Ledger
+from studies.store.paths import study_folder
 from studies.sweep.find_study import find_study
 from studies.sweep.job import reference_jobs
 from studies.sweep.standings import Standing, machines_of, mixture, standing_of, standings, summary
@@ -27,7 +29,7 @@ def status(
     check: Annotated[bool, typer.Option(help="verify the checksums of all files, not only changed ones")] = False,
 ) -> None:
     """Count what is ok, failed, stale or missing, and say why."""
-    chosen = [find_study(study)] if study else list(STUDIES)
+    chosen, root = [find_study(study)] if study else list(STUDIES), results
     if smoke:
         chosen, results = [entry.smoke() for entry in chosen], results / SMOKE
     own = [entry for entry in chosen if entry.word]  # those of the catalogue are tested
@@ -36,6 +38,9 @@ def status(
 
         for entry in own:
             check_columns(entry.columns)
+            study_folder(results, entry.name)  # raises for what names no folder
+    if not root.is_dir():
+        raise StudyError(f"there is no folder {root}: run `organbench run` first, or name the folder by --results")
     ledger = Ledger(results, check)
     for entry in chosen:
         with busy(f"checking {entry.name}"):

@@ -6,7 +6,9 @@ from typing import Annotated, Any, NamedTuple
 
 import typer
 
+from studies.base.errors import StudyError
 from studies.base.lookup import lookup
+from studies.catalog import Study
 from studies.cli.terminal import Results, StudyName, console, say, warn
 from studies.exchange.entry import entries_beside
 from studies.metrics.cells import MISSING, UNRESOLVED_NOTE, plain, value_cell
@@ -15,9 +17,11 @@ from studies.metrics.metrics import METRICS
 from studies.metrics.table import UNRESOLVED, frame_of, row_of
 from studies.metrics.table import metric as metric_of
 from studies.scene.quantities import ALWAYS
+from studies.store.entry import DAMAGED
 from studies.store.ledger import Ledger
 from studies.store.tables import write_parquet, write_table
 from studies.sweep.find_study import find_study
+from studies.sweep.job import case_jobs
 from studies.sweep.load import References
 from studies.sweep.rows import table_rows
 
@@ -43,6 +47,9 @@ def table(
     rows, remarks = table_rows(references, entry, chosen)
     entries, unreadable = entries_beside(results, entry.scenes, references.of)
     rows += [row_of(run, chosen) for run in entries]
+    if not rows:
+        warn(unreadable)
+        raise StudyError(why_empty(references.ledger, entry, study))
     warn([*remarks, *unreadable])
     written = [path for path in (csv, parquet) if path is not None]
     if written:
@@ -51,10 +58,16 @@ def table(
             if path is not None:
                 say(write(path, frame))
         return
-    if not rows:
-        say(f"no results for this study yet; run `organbench run {study}` first")
-        return
     draw(rows, chosen, every)
+
+
+def why_empty(ledger: Ledger, study: Study, word: str) -> str:
+    """Why no case of a study has a row. word: what the user calls the study."""
+    stored = [entry for job in case_jobs(ledger.root, study) if (entry := ledger.entry(job)) is not None]
+    if not stored:
+        return f"nothing of {word} is stored in {ledger.root}; run `organbench run {word}` first"
+    state = "damaged" if {entry.fault for entry in stored} == {DAMAGED} else "unreadable"
+    return f"all stored records of {word} are {state} ({len(stored)}); `organbench run {word}` computes them again"
 
 
 def draw(rows: Sequence[Row], metrics: list[Metric], every: bool) -> None:

@@ -115,7 +115,8 @@ def _data(root: Path, study: Study, run: Run) -> dict[str, Any]:
     own = files_of(run.case.method, run.case.body.law)
     files = [word for file in own for word in ("--file", file.path.name)]
     again = shlex.join(["organbench", "replay", str(path), *files])
-    return case_data(run, again) | {"run": command_line("run", [study], "--case", run.case.name, elsewhere=True)}
+    line = command_line("run", [study], "--case", run.case.name, *results_option(root), elsewhere=True)
+    return case_data(run, again) | {"run": line}
 
 
 def _scene_word(study: Study, scene: str) -> str:
@@ -131,7 +132,17 @@ def run_id(run: Run) -> str:
 
 def _named(root: Path, path: Path) -> Path:
     """As the command names it where the results folder lies: other folders stay private."""
-    return root.name / path.relative_to(root)
+    return _shown(root) / path.relative_to(root)
+
+
+def _shown(root: Path) -> Path:
+    """A results folder as it was given; of one elsewhere the last part."""
+    return Path(root.name) if root.is_absolute() or ".." in root.parts else root
+
+
+def results_option(root: Path) -> list[str]:
+    """What commands need to find the results folder, if it is not the usual one."""
+    return [] if _shown(root) == Path("results") else ["--results", str(_shown(root))]
 
 
 def _plain(value: Hashable) -> Hashable:

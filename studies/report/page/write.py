@@ -22,7 +22,7 @@ from studies.report.page.best import HEADS, answers, joined_best, own_first, sce
 from studies.report.page.case_data import merged
 from studies.report.page.findings import findings
 from studies.report.page.markup import ASSETS, TEMPLATES, machine_words, script_json, table, tabs
-from studies.report.page.part import Part, other_studies, part_path, read_part
+from studies.report.page.part import Part, other_studies, part_path, read_part, results_option
 
 Parts = list[tuple[Study, Part]]
 NAME = "report.html"
@@ -70,7 +70,7 @@ def write_page(
             remarks += [f"report.html: {remark}" for remark in part["remarks"]]
     if not parts:
         return None, remarks
-    page, more = fitting(parts, _machine(root), league)
+    page, more = fitting(parts, _machine(root), league, results_option(root))
     for name, content in page.files.items():
         write_whole(root / FOLDER / name, content)
     write_whole(root / NAME, page.content)
@@ -113,13 +113,15 @@ def joined_rows(rows: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
     return list(by_case.values())
 
 
-def fitting(parts: Parts, machine: dict[str, Any], league: Sequence[Mapping[str, Any]] = ()) -> tuple[Page, list[str]]:
+def fitting(
+    parts: Parts, machine: dict[str, Any], league: Sequence[Mapping[str, Any]] = (), options: Sequence[str] = ()
+) -> tuple[Page, list[str]]:
     """The page with as many cases as LIMIT has room for, the first one and those with the most to see before others;
     a sentence where even without cases it is larger."""
     cases = joined_cases([part for _, part in parts])
     first = first_case(cases)
     data = {"cases": _heads(cases), "first": first, "folder": FOLDER, "pieces": {}}
-    room, files = LIMIT - len(page(parts, data, machine, league)), {}
+    room, files = LIMIT - len(page(parts, data, machine, league, options)), {}
     for name, piece in _pieces(parts, cases, first).items():
         text = script_json(piece)
         size = len(text.encode()) + len(name) + len('"":,')
@@ -128,7 +130,7 @@ def fitting(parts: Parts, machine: dict[str, Any], league: Sequence[Mapping[str,
             room -= size
         else:
             files[f"{name}.js"] = f"keepPiece({json.dumps(name)}, {text});\n".encode()
-    content = page(parts, data, machine, league)
+    content = page(parts, data, machine, league, options)
     large = f"report.html has {len(content):,} bytes, more than {LIMIT:,}: its charts and its table are large"
     return Page(content, files), [large] if len(content) > LIMIT else []
 
@@ -160,9 +162,13 @@ def _rank(case: dict[str, Any]) -> int:
 
 
 def page(
-    parts: Parts, data: Mapping[str, Any], machine: dict[str, Any], league: Sequence[Mapping[str, Any]] = ()
+    parts: Parts,
+    data: Mapping[str, Any],
+    machine: dict[str, Any],
+    league: Sequence[Mapping[str, Any]] = (),
+    options: Sequence[str] = (),
 ) -> bytes:
-    """The file. data: what its script reads."""
+    """The file. data: what its script reads; options: of the commands that make it again."""
     rows = [{"study": study.name, **row} for study, part in parts for row in part["rows"]]
     case_rows = joined_rows(rows)
     tables = {study.name: part["rows"] for study, part in parts}
@@ -188,8 +194,8 @@ def page(
         count=counted(len(case_rows), "case"),
         csv=base64.b64encode(csv_of(rows).encode()).decode("ascii"),
         commands=[
-            command_line("run", studies, elsewhere=True),
-            command_line("report", [study for study in studies if study.word], elsewhere=True),
+            command_line("run", studies, *options, elsewhere=True),
+            command_line("report", [study for study in studies if study.word], *options, elsewhere=True),
         ],
         machine=machine_words(machine),
         league=league,

@@ -12,6 +12,7 @@ import pandas as pd
 import pytest
 
 from studies.catalog import Chart
+from studies.catalog.volume_loss import VOLUME_LOSS
 from studies.metrics.cells import UNRESOLVED_MARK
 from studies.report.results import draw_charts, refresh, report
 from studies.report.summary import results_of
@@ -71,6 +72,13 @@ def test_studies_that_were_not_run_are_named_in_one_line(results):
     assert [remark for remark in remarks if "no results here" in remark] == [
         "skipped (no results here; existing charts kept): other, third. Run `make study-NAME` first"
     ]
+
+
+def test_references_of_studies_that_were_not_run_are_not_read(results, monkeypatch):
+    read = []
+    monkeypatch.setattr(sweep_load, "reference_for", lambda root, scene: read.append(scene.name))
+    report(Ledger(results), [tiny_study(), VOLUME_LOSS])
+    assert set(read) == {scene.name for scene in tiny_study().scenes}
 
 
 def test_summary_without_results():

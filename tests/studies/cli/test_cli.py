@@ -13,6 +13,7 @@ from typer.testing import CliRunner
 from massspring import METHODS
 from studies.catalog import STUDIES
 from studies.cli import app as cli
+from studies.cli.commands import show as show_command
 from studies.cli.commands.status import SHOWN
 from studies.geometry.organs import SHAPES
 from studies.metrics.metrics import METRICS
@@ -126,12 +127,21 @@ def test_show_tells_units_status_and_numbers(organbench, results):
     path = case_path(results, "tiny", diverging_case())
     code, out, _ = organbench("show", path)
     assert code == 0
+    assert re.search(r" dt = [0-9.e-]+ s\b", out) and re.search(r"rest_volume = [0-9.e-]+ m\^3", out)
+    assert re.search(r"\bsteps = \d+ *(\w+ =.*)?$", out, re.MULTILINE), "a count has no unit"
     for word in ("status diverged", "dt_limit = ", "seconds = ", "volume", "m^3", "not finite: ", "code "):
         assert word in out
     code, whole, _ = organbench("show", path, "--all")
     assert code == 0
     for word in ("volume: enclosed volume", "beyond_limit"):
         assert word in whole and word not in out
+
+
+def test_show_goes_on_below_where_the_terminal_is_narrow(organbench, results, monkeypatch):
+    monkeypatch.setattr(show_command.console, "_width", 40)
+    path = case_path(results, "tiny", tiny_case())
+    shown = "".join(organbench("show", path)[1].split())
+    assert path.name in shown
 
 
 def test_table_on_screen_and_as_csv(organbench, tiny_file, results, tmp_path):

@@ -6,12 +6,15 @@ import json
 import os
 import subprocess
 import sys
+import tempfile
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from studies.cli import app as cli
+from studies.cli.commands import list as list_command
 from studies.runs.current import case_path
 from studies.store.paths import record_files
 from studies.store.record import Status, read_record, write_record
@@ -44,6 +47,13 @@ REPOSITORY = Path(__file__).parents[3]
         (("replay", "nothing.h5"), "there is no results file nothing.h5"),
         (("run", "nothing.py"), "there is no file nothing.py"),
         (("run", "volume_loss", "--case", "ball", "--report"), "give either --case or --report"),
+        (("run", "--jobs", "0"), "invalid value for '--jobs': "),
+        (("fuzz", "--cases", "-4"), "invalid value for '--cases': "),
+        (("prune", "--all", "--older-than", "nan"), "invalid value for '--older-than': "),
+        (("mesh", "ball", "--order", "3"), "`organbench mesh --help` lists the options"),
+        (("list", "--kind"), "no such option: --kind"),
+        (("table",), "missing argument 'study'; `organbench table --help` lists the options"),
+        (("table", "volume_loss"), "nothing of volume_loss is stored in"),
     ],
     ids=lambda value: " ".join(value) if isinstance(value, tuple) else "",
 )
@@ -53,10 +63,44 @@ def test_unknown_words_get_the_nearest_match(refused, tmp_path, monkeypatch, wor
     assert list(tmp_path.iterdir()) == []
 
 
+def test_an_unforeseen_error_is_one_sentence_that_names_the_file_of_its_traceback(refused, monkeypatch, tmp_path):
+    def unforeseen():
+        raise TypeError("two words\nand a second line")
+
+    monkeypatch.setattr(list_command, "list", unforeseen)
+    with pytest.raises(TypeError):
+        refused("list")  # of developers, whose variable is set
+    monkeypatch.setattr(cli, "TRACEBACK", "ORGANBENCH_NOT_SET")
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    sentence = refused("list")
+    assert sentence.startswith("organbench: failed unexpectedly: TypeError: two words; the traceback is in ")
+    (file,) = tmp_path.iterdir()
+    assert str(file) in sentence and "and a second line" in file.read_text() and "in unforeseen" in file.read_text()
+
+
+def test_a_traceback_that_cannot_be_written_is_printed(organbench, monkeypatch, tmp_path):
+    monkeypatch.setattr(list_command, "list", lambda: 1 / 0)
+    monkeypatch.setattr(cli, "TRACEBACK", "ORGANBENCH_NOT_SET")
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "none"))
+    code, _, err = organbench("list")
+    assert code == 2 and err.startswith("Traceback")
+    assert err.splitlines()[-1].startswith("organbench: failed unexpectedly: ZeroDivisionError: division by zero; ")
+
+
 def test_a_file_in_the_place_of_the_results_folder(refused, tmp_path):
     (tmp_path / "afile").write_text("")
     for words in (("status",), ("table", "volume_loss"), ("plot", "volume_loss"), ("advise", "ball_squeeze")):
         assert "is a file" in refused(*words, "--results", tmp_path / "afile")
+    assert "is a file" in refused("run", "volume_loss", "--dry-run", "--results", os.devnull)
+
+
+def test_status_of_a_folder_that_is_missing(refused, tmp_path):
+    assert f"there is no folder {tmp_path / 'none'}" in refused("status", "--results", tmp_path / "none")
+
+
+def test_the_table_of_a_study_of_which_nothing_is_stored_is_not_written(refused, tmp_path):
+    refused("table", "volume_loss", "--results", tmp_path, "--csv", tmp_path / "x.csv")
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_a_study_of_which_nothing_is_stored_is_not_drawn(refused, tmp_path):

@@ -8,6 +8,7 @@ import re
 import shutil
 from dataclasses import replace
 from html.parser import HTMLParser
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -17,7 +18,7 @@ from studies.catalog import Chart
 from studies.metrics.table import study_table
 from studies.report.page import write as module
 from studies.report.page.markup import script_json
-from studies.report.page.part import part_path, read_part, write_part
+from studies.report.page.part import part_path, read_part, results_option, write_part
 from studies.report.page.svg import inline
 from studies.report.page.write import ASSETS, SCRIPTS, write_page
 from studies.report.results import draw_charts, report
@@ -292,6 +293,14 @@ def test_commands_name_the_file_of_an_own_study(kept, tmp_path, monkeypatch):
     assert "organbench run &#39;my rod.py&#39; frame_rate" in text and "organbench report &#39;my rod.py&#39;" in text
     runs = [case["run"] for case in data_of(text)["cases"].values() if "entry" not in case]
     assert len(runs) == len(losses()) and all(run.startswith("organbench run 'my rod.py' --case ") for run in runs)
+
+
+@pytest.mark.parametrize(
+    ("root", "option"),
+    [("results", ""), ("results/demo", "--results results/demo"), ("/private/mine", "--results mine")],
+)
+def test_commands_name_the_results_folder(root, option):
+    assert results_option(Path(root)) == option.split()
 
 
 def test_a_chart_that_keeps_no_svg_is_left_out_with_a_remark(results):

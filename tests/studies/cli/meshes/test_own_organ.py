@@ -15,6 +15,7 @@ from studies.meshing.scene_mesh import mesh_for
 from studies.runs.case import BodyRecipe
 from studies.scene.chosen_place import DEPTH
 from studies.scene.scene import ReferencePlan
+from studies.scene.scene_file import file_in_python
 from studies.scene.tissues import SPLEEN
 from studies.tools.advise.answer import advise
 from studies.tools.advise.campaign import shipped
@@ -126,7 +127,12 @@ def test_a_scene_file_holds_the_tissue_the_hold_and_the_advised_body(organbench,
     words = ("spleen_mask.ply", "--unit", "mm", "--nodes", 200, "--hold", "bottom", "--smooth", 1)
     code, out, err = organbench("place", *words, "--close-holes", "-o", "placed.py")
     assert code == 0, err
-    assert out.startswith("tissue: spleen (3.6 kPa), as the file is called; --tissue names another\n")
+    tissue = "tissue: spleen, shear modulus 3.6 kPa, as the file is called; --tissue names another"
+    assert out.startswith(f"{tissue}\n  source: {SPLEEN.source}\n")
+    errors = re.search(r"worst errors of the recommended one in .*: (force .+ ± .+ %, displacement .+ ± .+ %)\n", out)[
+        1
+    ]
+    assert errors in (scan_file.parent / "placed.py").read_text()
     study = loaded(scan_file.parent / "placed.py").STUDY
     one, two = study.cases
     assert one.scene == two.scene and one.scene.tissue == SPLEEN
@@ -138,6 +144,12 @@ def test_a_scene_file_holds_the_tissue_the_hold_and_the_advised_body(organbench,
     assert one.body == BodyRecipe(nodes=200) and [case.recorded for case in study.cases] == [("surface",)] * 2
     # What the estimate rests on.
     assert one.scene.reference == ReferencePlan()
+
+
+def test_a_mesh_file_elsewhere_is_named_by_its_whole_path(tmp_path):
+    beside, elsewhere = tmp_path / "mine" / 'a "b".stl', tmp_path / "scan.stl"
+    assert file_in_python(elsewhere, tmp_path / "mine") == f'Path("{elsewhere}")'
+    assert file_in_python(beside, tmp_path / "mine") == r'Path(__file__).parent / "a \"b\".stl"'
 
 
 def test_bad_input_is_one_sentence(refused, scan_file, tmp_path):

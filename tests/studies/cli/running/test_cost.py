@@ -4,9 +4,12 @@ import json
 import re
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from massspring import Free, ImplicitVolume
+from studies.cli.commands import profile
+from studies.cli.commands.profile import COST, SHARE, SPREAD, WHOLE
 from studies.metrics.timing.skips import SKIPS
 from studies.metrics.timing.stage_cost import ENERGIES, FRAME, ROWS, SKIPPED, STAGE, cost_table, run_frames
 from studies.runs.case import BodyRecipe
@@ -96,7 +99,25 @@ def test_the_command_prints_a_table_or_json(organbench, tmp_path):
     assert code == 0 and "springs and prediction" in out and NO_CONTACT in out
     assert (tmp_path / "cost.csv").read_text(encoding="utf-8").startswith("kind,what,")
     code, out, _ = organbench(*words, "--json")
-    assert {row["kind"] for row in json.loads(out)} == {STAGE, SKIPPED, FRAME}
+    rows = json.loads(out)
+    assert {row["kind"] for row in rows} == {STAGE, SKIPPED, FRAME} and all(row[SPREAD] >= 0.0 for row in rows)
+
+
+def test_costs_have_the_spread_of_the_measurements(organbench, monkeypatch):
+    def made(friction):
+        rows = [
+            (STAGE, WHOLE, 20.0, ""),
+            (SKIPPED, "gravity", 2.0 + 0.1 * friction, ""),
+            (SKIPPED, "friction", friction, ""),
+        ]
+        table = pd.DataFrame(rows, columns=["kind", "what", COST, "how much"])
+        return table.assign(**{SHARE: table[COST] / 20.0})
+
+    tables = map(made, (-0.7, 0.1, -0.3))
+    monkeypatch.setattr(profile, "cost_table", lambda case, budget: next(tables))
+    out = organbench("profile", "ball_clamped", "--nodes", HELD.nodes)[1]
+    assert re.search(r"gravity +1\.97 ± 0\.04 +9\.8 %", out)
+    assert re.search(r"friction +−0\.3 ± 0\.4 +below resolution", out)
 
 
 def test_bad_words_are_refused(refused):

@@ -9,6 +9,7 @@ import pytest
 
 from studies.metrics.timing.cases import timing_file
 from studies.runs.current import case_path
+from studies.store.paths import record_files
 from tests.studies.tiny import tiny_case
 
 
@@ -41,6 +42,19 @@ def test_a_cut_off_file_hides_no_other(organbench, tiny_file, results):
     assert len(err.splitlines()) == 1
     assert path.name in err
     assert "free" in out
+
+
+def test_a_study_of_damaged_files_alone_is_refused(refused, tiny_file, results):
+    for path in record_files(results, "tiny"):
+        path.write_bytes(b"damaged")
+    sentence = refused("table", tiny_file, "--results", results)
+    assert f"all stored records of {tiny_file} are damaged (3); `organbench run" in sentence
+
+
+@pytest.mark.parametrize("name", ["tiny.csv", "tiny.h5"])
+def test_only_results_files_are_to_be_deleted(refused, tmp_path, name):
+    (tmp_path / name).write_text("a,b\n")
+    assert ("delete it" in refused("show", tmp_path / name)) == name.endswith(".h5")
 
 
 @pytest.mark.parametrize("fault", ["the key", "a field", "a number", "the timing"])

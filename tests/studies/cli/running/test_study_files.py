@@ -147,3 +147,12 @@ def test_a_chart_that_fails_is_a_sentence_after_all_else_is_done(refused, result
     assert CHARTS[draw] in refused("plot", path, "--results", results)
     assert (results / "tiny" / "b.txt").read_text() == "drawn"
     assert (results / "tiny" / "tiny.csv").exists()
+
+
+def test_a_dry_run_with_a_missing_mesh_file_is_refused(refused, tmp_path):
+    file = tmp_path / "mine.py"
+    file.write_text(
+        "from tests.studies.tiny import *\n"
+        "STUDY = tiny_study(cases=(tiny_case(scene=file_scene('none.stl'), body=BodyRecipe('surface')),))\n"
+    )
+    assert "there is no mesh file none.stl" in refused("run", file, "--dry-run", "--results", tmp_path / "results")

@@ -1,0 +1,31 @@
+"""`organbench demo`: three bodies with their speeds, and a page that names its own results folder."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from studies.catalog.demo import WORDS
+from studies.cli.commands import demo
+from studies.sweep.job import case_jobs
+from tests.studies.tiny import tiny_study
+
+
+@pytest.mark.slow
+def test_three_bodies_have_speeds_with_a_spread(organbench, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    code, out, _ = organbench("demo", "--results", "results/demo")
+    assert code == 0
+    for words in WORDS:
+        assert re.search(rf"^{words}: volume .+, force .+ ± .+ %, .+ ± .+ times real time$", out, re.MULTILINE)
+    page = Path("results/demo/report.html").read_text(encoding="utf-8")
+    assert "<code>organbench run demo --results results/demo</code>" in page
+    assert "simulated in a second of computing" in page and "o time is measured" not in page
+    # The curve of the recommended body too.
+    assert "quadratic, masses by stiffness" in page
+
+
+def test_other_programs_on_the_core_are_a_warning(results, monkeypatch, capsys):
+    monkeypatch.setattr(demo.time, "process_time", lambda: 0.0)
+    demo.time_frames(case_jobs(results, tiny_study())[0])
+    assert "other programs took 100 % of the core" in capsys.readouterr().err
