@@ -76,9 +76,10 @@ def run(
     chosen, well = [_chosen(study, smoke, case) for study in find_studies(studies or [])], True
     todo = [study for study in chosen if not again and plan(ledger, study, _selection(ledger, study, rules))]
     for study in todo:
+        warnings = check_study(study, drawn=not case)
         if dry:
             _check_mesh_files(study)
-        warn(check_study(study, drawn=not case))
+        warn(warnings)
     if todo and report and not (on or dry):
         _compile()
     with executor_for(on, jobs or JOBS, portable, root, say) as executor:

@@ -84,7 +84,7 @@ def test_a_scene_alone_is_a_study_of_four_bodies_with_charts(write):
     "words", [("run", "--dry-run"), ("status",), ("advise", "--no-timing"), ("safe-dt", "--nodes", 60)]
 )
 def test_both_kinds_of_file_are_taken(organbench, write, tmp_path, monkeypatch, words):
-    monkeypatch.setenv("ORGANBENCH_RESULTS", str(tmp_path / "results"))
+    monkeypatch.setenv("ORGANBENCH_RESULTS", str(tmp_path))
     command, *options = words
     for part in (SCENE, STUDY):
         _, out, err = organbench(command, write(part), *options)
