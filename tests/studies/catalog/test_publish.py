@@ -49,6 +49,12 @@ def home(tmp_path, monkeypatch):
     return tmp_path / "home"
 
 
+@pytest.fixture
+def small_population(monkeypatch):
+    """Drawing the real one takes seconds."""
+    monkeypatch.setattr(command, "find_study", lambda name: replace(HEADLINE, name=name))
+
+
 def shown(home):
     """Name and content of all that is published, and of the page."""
     return {path.relative_to(home).as_posix(): path.read_bytes() for path in home.rglob("*") if path.is_file()}
@@ -295,6 +301,7 @@ def test_the_code_of_every_published_text_is_noted(summary):
     assert summary.file in noted(REPOSITORY / PUBLISHED)
 
 
+@pytest.mark.usefixtures("small_population")
 def test_the_command_says_what_is_behind_with_exit_code_1(current, home, organbench, monkeypatch):
     monkeypatch.chdir(home)
     monkeypatch.setattr(command, "STUDIES", (HEADLINE,))
@@ -307,6 +314,7 @@ def test_the_command_says_what_is_behind_with_exit_code_1(current, home, organbe
     assert "0 of 1 are current" in out
 
 
+@pytest.mark.usefixtures("small_population")
 def test_a_published_file_that_nothing_makes_is_named(home, refused, monkeypatch):
     monkeypatch.chdir(home)
     assert "there is no results/published; run the command" in refused("publish", "--check")
