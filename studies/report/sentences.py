@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from textwrap import fill
 from typing import Any
@@ -15,7 +16,7 @@ from studies.meshing.bounds import SHAPE
 from studies.metrics.cells import MINUS, plain
 from studies.metrics.distribution import distribution
 from studies.metrics.judged import Measured, over_meshes
-from studies.metrics.wish import usual_wish
+from studies.metrics.wish import Wish, usual_wish
 from studies.plots.campaigns.recovery import RETURNED
 from studies.report.kept_volume import WORST
 from studies.report.summary import Choice, choice_of
@@ -237,7 +238,7 @@ def random_organs(published: Path) -> str:
 
 def _organ_row(organ: str, rows: Sequence[Row]) -> str:
     """The line of an organ in the table of random organs."""
-    wish, force = usual_wish(RANGES[organ].scene), _bound(rows, FORCE, ".1f")
+    wish, force = _wish(organ), _bound(rows, FORCE, ".1f")
     targets = f"{wish.force:g}, {wish.displacement:g}" if force else f"–, {wish.displacement:g}"
     unsure = sum(_is_undecided(organ, row) for row in rows)
     return (
@@ -303,9 +304,15 @@ def _is_undecided(organ: str, row: Row) -> bool:
 
 def _is_beyond(organ: str, row: Row, sign: int) -> bool:
     """Whether an error of a member, plus `sign` times the uncertainty of its reference, is beyond its target."""
-    wish = usual_wish(RANGES[organ].scene)
+    wish = _wish(organ)
     bounds = {FORCE: wish.force, MEAN: wish.displacement}
     return any(abs(row[name]) + sign * row[_floor(name)] > bound for name, bound in bounds.items())
+
+
+@cache
+def _wish(organ: str) -> Wish:
+    """The usual target of an organ of the population; it depends on its shape, which takes milliseconds to make."""
+    return usual_wish(RANGES[organ].scene)
 
 
 def _floor(name: str) -> str:

@@ -11,7 +11,7 @@ from studies.sweep.job import case_jobs
 from tests.studies.tiny import tiny_study
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_three_bodies_have_speeds_with_a_spread(organbench, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     code, out, _ = organbench("demo", "--results", "results/demo")
