@@ -4,7 +4,6 @@ import warnings
 from pathlib import Path
 from typing import Annotated
 
-import numpy as np
 import pandas as pd
 import typer
 from rich.table import Table
@@ -51,18 +50,21 @@ def profile(
 
 def measured(case: Case) -> pd.DataFrame:
     """The mean of several tables of costs, with a column for half their range. A stage that took no time in one of
-    them is missing there."""
+    them is missing there, and counts as zero."""
     budget = BUDGET / MEASUREMENTS
     tables = [cost_table(case, budget=budget)]
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)  # the same again
         tables += [cost_table(case, budget=budget) for _ in range(MEASUREMENTS - 1)]
-    whole = max(tables, key=len)
-    costs = pd.concat([table.set_index(["kind", "what"])[COST] for table in tables], axis=1)
-    costs = costs.reindex(whole.set_index(["kind", "what"]).index).fillna(0.0).to_numpy()
-    mean, spread = costs.mean(axis=1), 0.5 * np.ptp(costs, axis=1)
-    step = float(mean[(whole["what"] == WHOLE).to_numpy()][0])
-    return whole.assign(**{COST: mean, SPREAD: spread, SHARE: mean / step})
+    rows = [table.set_index(["kind", "what"]) for table in sorted(tables, key=len, reverse=True)]
+    costs = pd.concat([row[COST] for row in rows], axis=1).fillna(0.0)
+    remarks = pd.concat([row["how much"] for row in rows]).groupby(level=[0, 1]).first()
+    kinds = {kind: place for place, kind in enumerate(HEADINGS)}
+    costs = costs.sort_index(level="kind", key=lambda level: level.map(kinds), sort_remaining=False, kind="stable")
+    mean, spread = costs.mean(axis=1), 0.5 * (costs.max(axis=1) - costs.min(axis=1))
+    step = float(mean[STAGE, WHOLE])
+    columns = {COST: mean, SHARE: mean / step, "how much": remarks.reindex(costs.index), SPREAD: spread}
+    return pd.DataFrame(columns).reset_index()
 
 
 def _drawn(costs: pd.DataFrame) -> Table:

@@ -93,7 +93,8 @@ def test_the_table_counts_the_pairs_that_sleep(mesh_cache):
     assert line.endswith("left behind 0")
 
 
-def test_the_command_prints_a_table_or_json(organbench, tmp_path):
+def test_the_command_prints_a_table_or_json(organbench, tmp_path, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "120")  # large costs would wrap the names of what is skipped
     words = ("profile", "ball_clamped", "--nodes", HELD.nodes, "--method", "free")
     code, out, _ = organbench(*words, "--csv", tmp_path / "cost.csv")
     assert code == 0 and "springs and prediction" in out and NO_CONTACT in out
@@ -118,6 +119,23 @@ def test_costs_have_the_spread_of_the_measurements(organbench, monkeypatch):
     out = organbench("profile", "ball_clamped", "--nodes", HELD.nodes)[1]
     assert re.search(r"gravity +1\.97 ± 0\.04 +9\.8 %", out)
     assert re.search(r"friction +−0\.3 ± 0\.4 +below resolution", out)
+
+
+def test_a_stage_that_one_measurement_missed_counts_as_zero_there(monkeypatch):
+    """Two measurements miss one stage each, so that no table has them all."""
+
+    def made(stage, cost):
+        rows = [(STAGE, "springs", 3.0, ""), (STAGE, stage, cost, ""), (STAGE, WHOLE, 6.0, ""), (FRAME, "paths", 1, "")]
+        return pd.DataFrame(rows, columns=["kind", "what", COST, "how much"]).assign(**{SHARE: 0.0})
+
+    tables = iter([made("contact", 3.0), made("gravity", 1.5), made("contact", 3.0)])
+    monkeypatch.setattr(profile, "cost_table", lambda case, budget: next(tables))
+    costs = profile.measured(tiny_case())
+    assert costs["kind"].tolist() == [STAGE] * 4 + [FRAME]
+    assert dict(zip(costs["what"], costs[COST], strict=True)) == {
+        "springs": 3.0, "contact": 2.0, WHOLE: 6.0, "gravity": 0.5, "paths": 1.0,
+    }  # fmt: skip
+    assert costs.set_index("what")[SPREAD]["gravity"] == 0.75 and costs.set_index("what")[SHARE]["contact"] == 1 / 3
 
 
 def test_bad_words_are_refused(refused):
