@@ -49,10 +49,15 @@ def find_study(name: str) -> Study:
 
 
 def _on_folder(name: str, given: str) -> Study:
-    from studies.catalog.population import study_on  # with the geometry of scans, which takes a while to load
+    from studies.catalog.population import (  # with the geometry of scans, which takes a while to load
+        POPULATION,
+        study_of_recipes,
+        study_on,
+    )
 
     folder, _, unit = given.partition(":") if not Path(given).is_dir() else (given, "", "")
-    study, placed = study_on(find_study(name), Path(folder), unit or None)
+    study = study_of_recipes() if name == POPULATION else find_study(name)
+    study, placed = study_on(study, Path(folder), unit or None)
     for one in placed:
         sentence = "; ".join(one.words)
         if sentence:

@@ -3,7 +3,7 @@
 from studies.catalog.population.draw import Population, member
 from studies.catalog.population.folder import Placed, placed_organs, study_on
 from studies.catalog.population.ranges import RANGES, Ranges
-from studies.catalog.population.study import POPULATION, population_study
+from studies.catalog.population.study import POPULATION, population_study, study_of_recipes
 
 __all__ = [
     "POPULATION",
@@ -14,5 +14,6 @@ __all__ = [
     "member",
     "placed_organs",
     "population_study",
+    "study_of_recipes",
     "study_on",
 ]

@@ -12,6 +12,7 @@ from studies.base.errors import StudyError
 from studies.geometry import HalfSpace, ball, fill, organ
 from studies.geometry.mesher import jobs, process
 from studies.geometry.mesher.jobs import mesh_from, recipe_hash
+from tests.campaigns import campaign
 
 RECIPE = {"kind": "organ", "name": "ball", "organ": "ball", "nodes": 150, "parameters": {}, "regions": {}, "fill": True}
 
@@ -41,7 +42,7 @@ def test_the_second_time_nothing_is_made(own_cache, monkeypatch):
     assert same(ball(150), first)
 
 
-@pytest.mark.parametrize(("name", "nodes"), [("ball", 100), ("stomach", 300)])
+@pytest.mark.parametrize(("name", "nodes"), [("ball", 100), campaign("stomach", 300)])
 def test_a_surface_made_before_is_filled_as_if_made_now(own_cache, monkeypatch, name, nodes):
     """A solid organ and a hollow one: the cached surface is filled, and the mesh is the same to the bit."""
     alone = organ(name, nodes)

@@ -77,6 +77,7 @@ def test_bare_area_converges_with_the_mesh(livers):
     assert area[550] == pytest.approx(limit, rel=0.025)
 
 
+@pytest.mark.campaign
 @settings(max_examples=15, deadline=None, derandomize=True)
 @given(
     st.lists(st.floats(-1, 1), min_size=3, max_size=3).filter(lambda n: np.linalg.norm(n) > 0.1), st.floats(0.15, 0.85)

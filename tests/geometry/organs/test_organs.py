@@ -185,7 +185,7 @@ def test_bad_wishes_get_a_sentence(call, sentence):
         call()
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_a_fine_surface_is_filled_with_elements_that_grow_inwards():
     mesh = ball(4000, RADIUS)
     assert mesh.surface_count == 4000

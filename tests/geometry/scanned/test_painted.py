@@ -9,6 +9,7 @@ from studies.geometry.mesh.organ_mesh import triangle_areas
 from studies.geometry.shape.regions import region_from_dict, region_to_dict
 from studies.geometry.surface.distance import distance_to_surface
 from studies.geometry.surface.painted import painted_region
+from tests.campaigns import campaign
 from tests.geometry.boxes import box, split
 from tests.geometry.files import writers
 
@@ -53,7 +54,7 @@ def path(kidney, region, tmp_path_factory):
     return file
 
 
-@pytest.mark.parametrize("nodes", [300, 800])
+@pytest.mark.parametrize("nodes", [300, campaign(800)])
 def test_a_painted_region_travels_to_the_new_surface(kidney, region, path, nodes):
     mesh = scan(path, nodes, unit="mm", fill=False)
     true = organ("kidney", 2000, fill=False, exact=True)
@@ -103,6 +104,7 @@ def test_without_a_new_surface_the_painted_nodes_stay(path, kidney, region):
     assert len(mesh.patches[HILUM]) == len(inside)
 
 
+@pytest.mark.campaign
 def test_regions_that_are_given_come_instead(path):
     end = BallRegion((0.0, 0.0, 0.05), 0.02)
     assert set(scan(path, 300, unit="mm", fill=False, regions={"end": end}).patches) == {"end"}

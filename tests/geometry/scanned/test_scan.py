@@ -111,6 +111,7 @@ def test_warnings_name_flipped_triangles_and_parts_that_are_left_out(block, tmp_
     assert mesh.volume == pytest.approx(volume_of(block), rel=0.04)
 
 
+@pytest.mark.campaign
 def test_a_surface_that_crosses_itself_becomes_a_body(block, tmp_path):
     points, faces = block[1].copy(), block[2]
     top = points[:, 2].argmax()
@@ -123,6 +124,7 @@ def test_a_surface_that_crosses_itself_becomes_a_body(block, tmp_path):
     assert mesh.volume == pytest.approx(volume_of(block), rel=0.06)
 
 
+@pytest.mark.campaign
 @pytest.mark.filterwarnings("ignore:.*(is missing from the mesh|has a part here that the)")
 def test_handles_are_kept_and_a_warning_counts_them(tmp_path):
     round_it, round_tube = 24, 12
@@ -141,6 +143,7 @@ def test_handles_are_kept_and_a_warning_counts_them(tmp_path):
     assert mesh.volume == pytest.approx(signed_volume(points * MM, faces), rel=1e-3) and mesh.losses["handles"] == 1
 
 
+@pytest.mark.campaign
 def test_a_thin_flap_is_kept_or_a_warning_names_it(tmp_path):
     """A plate of 3 mm on an egg: a third of it is thinner than the cells of the first grid."""
     egg = split(*box((-1, -1, -1), (1, 1, 1)), times=4)

@@ -53,6 +53,7 @@ def test_a_capsule_is_a_finding_and_the_way_out_works(capsule):
     assert body.losses["file_to_mesh"]["max"] < 0.03 * body.losses["diagonal"]
 
 
+@pytest.mark.campaign
 @pytest.mark.filterwarnings("ignore:.*the mesh has a part here that the file does not")
 def test_a_surface_with_a_hole_is_filled_too(tmp_path):
     faces = BALL[1][OUTER[BALL[1]].mean(axis=1)[:, 2] < 19.5]

@@ -10,6 +10,7 @@ from studies.geometry.organs import SHAPES
 from studies.geometry.shape.regions import BallRegion
 from studies.geometry.surface.family import true_volume
 from studies.geometry.surface.volume import depth, with_volume
+from tests.campaigns import campaign
 from tests.geometry.boxes import box, split
 from tests.geometry.files import writers
 
@@ -28,7 +29,7 @@ def egg(tmp_path_factory):
     return path, points * MM, faces
 
 
-@pytest.mark.parametrize("nodes", [150, 550])
+@pytest.mark.parametrize("nodes", [150, campaign(550)])
 def test_a_scan_keeps_its_volume_and_its_outlines(egg, nodes):
     path, points, faces = egg
     mesh = scan(path, nodes, unit="mm", regions={"cap": CAP, "spot": SPOT})
@@ -51,6 +52,7 @@ def test_a_scan_keeps_its_volume_and_its_outlines(egg, nodes):
     assert area == pytest.approx(share, rel=0.04)
 
 
+@pytest.mark.campaign
 def test_a_hollow_scan_has_both_volumes(egg):
     mesh = scan(egg[0], 300, unit="mm", wall=0.004)
     assert mesh.outer_volume == pytest.approx(signed_volume(*egg[1:]), rel=1e-5)
@@ -61,7 +63,7 @@ def test_a_hollow_scan_has_both_volumes(egg):
     assert mesh.lumen_volume == pytest.approx(inner, rel=3e-3)
 
 
-QUICK = ("bladder", "kidney")
+QUICK = ("kidney",)
 
 
 @pytest.mark.parametrize(

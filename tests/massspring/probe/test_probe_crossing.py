@@ -4,6 +4,7 @@ import itertools
 import re
 
 import numpy as np
+import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
@@ -122,6 +123,7 @@ def apart(body, most):
     return np.array(chosen)
 
 
+@pytest.mark.campaign
 @settings(max_examples=25, deadline=None, derandomize=True)
 @given(**PATHS)
 def test_nor_where_single_nodes_are_attached(**path):
@@ -150,6 +152,7 @@ def test_a_tip_that_meets_an_attached_node_ends_the_run():
     assert top in BALL.triangles[state.probing.passed[0] - 1]
 
 
+@pytest.mark.campaign
 @settings(max_examples=25, deadline=None, derandomize=True)
 @given(**PATHS)
 def test_attached_tissue_stops_the_run_and_nothing_else_does(**path):

@@ -34,6 +34,7 @@ def ramps(draw):
     return Ramp(tuple(np.cumsum(gaps) - draw(st.floats(0.0, 1.0))), tuple(values))
 
 
+@pytest.mark.campaign
 @settings(deadline=None)
 @given(ramps(), st.floats(0.1, 20.0))
 def test_what_is_followed_is_what_small_steps_towards_the_target_give(target, rate):

@@ -17,10 +17,12 @@ from studies.meshing.scene_mesh import mesh_for, patch_nodes
 from studies.reference.nested import problem_of
 from studies.reference.problem import anchor, kept_obstacles, reference_problem
 from studies.scene.library import JUDGED, SCENES
+from tests.campaigns import campaigns_but
 from tests.studies.catalog.test_scenes import SMALL, THIN, small_setup
+from tests.studies.tiny import quick_to_mesh
 
 
-@pytest.fixture(params=JUDGED, ids=lambda scene: scene.name)
+@pytest.fixture(params=campaigns_but(JUDGED, quick_to_mesh), ids=lambda scene: scene.name)
 def judged(request):
     return request.param
 

@@ -177,6 +177,7 @@ def test_the_reference_after_the_cut_is_the_end_of_the_whole_one(tmp_path):
     assert reference_of(BALL_INCISED, whole) is whole and given_scene(BALL_SQUEEZE) is BALL_SQUEEZE
 
 
+@pytest.mark.campaign
 def test_pieces_keep_a_volume_each(mesh_cache):
     for kind in ("straight", "curved"):
         mesh = given_mesh(given_scene(BALL_BISECTED), NODES, kind)

@@ -55,5 +55,6 @@ def test_what_its_weight_bends_is_drawn_less(scene, share):
     assert middles(scene) == share
 
 
+@pytest.mark.campaign
 def test_a_body_that_nothing_holds_is_graded_too(mesh_cache):
     assert graded_mesh(BALL_SQUEEZE, 600, 1, 1, True).smallest_jacobian > 0

@@ -55,8 +55,8 @@ def test_a_quadratic_body_is_as_large_and_heavy_as_the_ball(mesh_cache):
         assert (sign * body.rest[nodes, 2] >= CAP * RADIUS * (1 - 1e-9)).all()
 
 
+@pytest.mark.campaign
 @made
-@pytest.mark.slow
 def test_the_lumen_of_a_quadratic_bladder_is_its_last_volume_and_is_filled(mesh_cache):
     prepared = prepare(Case(BLADDER_FILL, BodyRecipe("quadratic", 800)))
     assert prepared.setup.body.kept.names[-1] == "lumen"

@@ -6,10 +6,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from massspring import Sphere, Trajectory
 from studies.base.errors import StudyError
 from studies.geometry import HalfSpace
 from studies.meshing import kept_shape
-from studies.meshing.kept_shape import held_area_error, held_facets, level_that_holds, tell_shape, touched_facets
+from studies.meshing.kept_shape import (
+    FACETS,
+    held_area_error,
+    held_facets,
+    level_that_holds,
+    tell_shape,
+    touched_facets,
+)
 from studies.meshing.scene_mesh import mesh_for
 from studies.runs.case import BodyRecipe
 from studies.runs.prepare import mesh_of, prepare
@@ -71,16 +79,31 @@ def test_the_held_area_is_warned_of_and_then_refused(monkeypatch, off, severity)
         assert sum("held region" in line for line in warnings_of(scene, mesh)) == severity
 
 
+def probed(radius: float):
+    """The clamped ball with a probe that enters its side by a fifth of its size."""
+    path = Trajectory((0.0, 1.0), ((0.0, 0.0, 0.0), (-0.02, 0.0, 0.0)))
+    return replace(BALL_CLAMPED, obstacles=(Sphere((0.05 + radius, 0.0, 0.0), radius, path),))
+
+
 def test_a_warning_names_few_facets_before_the_run(monkeypatch):
+    mesh = mesh_of(BALL_CLAMPED, BodyRecipe(nodes=294))
+    thin, thick = (touched_facets(probed(radius), mesh) for radius in (0.01, 0.04))
+    assert 0 < thin < FACETS < thick
+    (sentence,) = [line for line in warnings_of(probed(0.01), mesh) if "touch" in line]
+    assert f"about {thin:.0f} facets" in sentence and "below 20" in sentence and "graded='adaptive'" in sentence
+    assert not any("touch" in line for line in warnings_of(probed(0.04), mesh))
+    monkeypatch.setattr(kept_shape, "FACETS", thin)
+    assert not any("touch" in line for line in warnings_of(probed(0.01), mesh))
+    assert touched_facets(BALL_CLAMPED, mesh) is None  # no probe
+
+
+@pytest.mark.campaign
+def test_the_graded_liver_has_more_facets_under_its_probe():
     few = mesh_of(LIVER_PROBE, BodyRecipe("quadratic", 394))
     many = mesh_of(LIVER_PROBE, BodyRecipe("quadratic", 594, graded=True))
     (sentence,) = [line for line in warnings_of(LIVER_PROBE, few) if "touch" in line]
     assert "below 20" in sentence and "graded='adaptive'" in sentence
-    enough = touched_facets(LIVER_PROBE, many)
-    assert enough > touched_facets(LIVER_PROBE, few) > 0
-    monkeypatch.setattr(kept_shape, "FACETS", enough)
-    assert not any("touch" in line for line in warnings_of(LIVER_PROBE, many))
-    assert touched_facets(BALL_CLAMPED, few) is None  # no probe
+    assert touched_facets(LIVER_PROBE, many) > touched_facets(LIVER_PROBE, few) > 0
 
 
 def test_a_file_that_comes_as_it_is_has_its_own_shape(tmp_path):
@@ -98,7 +121,7 @@ def test_a_file_that_comes_as_it_is_has_its_own_shape(tmp_path):
     assert "held region 'foot' -" in sentence and "off the true surface" not in sentence
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_the_flat_stomach_of_400_nodes_holds_too_little():
     scene = next(scene for scene in SCENES if scene.name == "stomach_press")
     (sentence,) = warnings_of(scene, mesh_of(scene, BodyRecipe(nodes=400)))

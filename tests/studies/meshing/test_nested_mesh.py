@@ -273,6 +273,7 @@ def test_the_faces_of_a_cut_stay_in_its_plane_where_the_surface_leans_over_it():
         assert area / 2 == pytest.approx(np.pi * (RADIUS**2 - height**2), rel=8e-3)
 
 
+@pytest.mark.campaign
 def test_the_coarsest_mesh_keeps_the_area_that_is_held_and_no_part_of_it_folds():
     """At 270 surface nodes the end of the hilum is lost; the next finer mesh has an element that folds between the
     points where the reference integrates it."""
@@ -289,6 +290,7 @@ def test_the_coarsest_mesh_keeps_the_area_that_is_held_and_no_part_of_it_folds()
     assert halved.lost_area < LOST
 
 
+@pytest.mark.campaign
 def test_a_region_that_no_mesh_keeps_has_no_reference(monkeypatch):
     monkeypatch.setattr(NestedMesh, "lost_area", 4.2)
     with pytest.raises(StudyError, match=r"from 80 to 160 surface nodes .* at least 4.2 % off .*allowed: 3 %.*base"):

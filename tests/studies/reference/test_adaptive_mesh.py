@@ -118,6 +118,7 @@ def test_elements_at_an_outline_stop_where_the_stretch_would_be_too_large():
         adapted(coarse, wished * (wished == 1.0), 10_000, 10.0)
 
 
+@pytest.mark.campaign
 def test_a_hanging_organ_is_adapted_and_large_strains_stop_it_at_its_outline(mesh_cache):
     count = 494
     organ_mesh, coarse = coarse_mesh(SPLEEN_SAG, count)

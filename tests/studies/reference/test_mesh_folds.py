@@ -39,6 +39,7 @@ def curved_sides(scene, level):
     return on_true_sides(scene, organ_mesh, coarse, body), as_curved(body, coarse, bent), upright_cells(body)
 
 
+@pytest.mark.campaign
 def test_a_mesh_that_only_the_mesher_s_bound_refuses_is_taken():
     with pytest.raises(StudyError, match="fold when they follow"):
         curved(mesh_for(STRICT, 370))

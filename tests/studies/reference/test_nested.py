@@ -22,6 +22,7 @@ from studies.scene.library.ball_clamped import RADIUS
 from studies.scene.scene import ForceOutput
 from studies.store.record import Status, read_record
 from studies.tools.verify.second_judge import JUDGES, verdict
+from tests.campaigns import campaign
 
 TRUTH = 4.227
 """Force at the end [N], within .05 %: meridians of NGSolve and of our own (docs/theory.md, section 6)."""
@@ -209,7 +210,7 @@ def ball_under(friction):
 
 @pytest.mark.parametrize(
     ("friction", "within", "settings"),
-    [(0, 2e-3, NewtonSettings(penetration_tol=1e-5)), ("no_slip", 5e-3, NewtonSettings())],
+    [(0, 2e-3, NewtonSettings(penetration_tol=1e-5)), campaign("no_slip", 5e-3, NewtonSettings())],
 )
 def test_contact_is_solved_on_every_mesh(mesh_cache, friction, within, settings):
     """Within how far points may sink in, and slip from step to step; without slip by a path from rest on each mesh, as

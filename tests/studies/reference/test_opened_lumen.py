@@ -113,6 +113,7 @@ def test_it_ends_as_one_that_was_never_filled(mesh, path):
     np.testing.assert_allclose(path[-1].u, never[-1].u, atol=1e-9 * RADIUS)
 
 
+@pytest.mark.campaign
 def test_elements_adapt_to_the_opened_wall_without_its_content(mesh_cache):
     """Those of a filled wall that is opened are those of one that was never filled."""
     made, coarse = coarse_mesh(PULLED, 400)

@@ -38,6 +38,7 @@ def kidney(tmp_path_factory, mesh_cache):
         return mesh.points, scan_scenes(path)
 
 
+@pytest.mark.campaign
 def test_the_free_end_is_grasped_and_lifted_across_the_length(kidney):
     points, scenes = kidney
     held = [one.region.level(points) <= 0 for one in scenes["lifted"].held]

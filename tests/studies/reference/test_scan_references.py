@@ -49,6 +49,7 @@ def shape(scene):
     return true_shape(scene.organ)
 
 
+@pytest.mark.campaign
 def test_the_curved_body_has_the_volume_of_the_surface(scene):
     """A polyhedron with 100 nodes on the ball would be 6 % smaller."""
     mesh = mesh_at(scene, LEVEL, 0, 0, True)

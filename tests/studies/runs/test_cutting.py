@@ -24,10 +24,12 @@ from studies.scene.library.ball_bisected import BALL_BISECTED
 from studies.scene.library.ball_incised import BALL_INCISED
 from studies.scene.library.kidney_bisected import KIDNEY_BISECTED
 from studies.store.record import write_record
+from tests.campaigns import campaign
 
 pytestmark = pytest.mark.slow
 METRIC = {metric.name: metric for metric in METRICS}
 ONE, QUADRATIC, SURFACE = BodyRecipe(nodes=200), BodyRecipe("quadratic", nodes=600), BodyRecipe("surface", nodes=200)
+NODAL = BodyRecipe(nodes=200, law="cotangent", volumes="nodal")
 
 
 @pytest.fixture(scope="module")
@@ -55,6 +57,7 @@ def test_the_incision_gapes_as_in_the_reference(incised):
         assert METRIC["cut_ms"](run) > 0.0
 
 
+@pytest.mark.campaign
 def test_the_body_is_judged_before_the_cut_too(incised):
     """The reference is then the uncut ball: solved without a cut, it has the same force within the bars of both."""
     reference = incised["quadratic"].reference
@@ -146,7 +149,9 @@ def test_paraview_sees_the_cut_shut_before_and_open_after_it(incised, tmp_path):
         assert gap[0].max() == 0.0 and gap[-1].min() > 1e-4 and gap[-1].max() > 0.01
 
 
-@pytest.mark.parametrize("body", [ONE, QUADRATIC, SURFACE, BodyRecipe(nodes=200, law="cotangent", volumes="nodal")])
+@pytest.mark.parametrize(
+    "body", [ONE, campaign(QUADRATIC), SURFACE, BodyRecipe(nodes=200, law="cotangent", volumes="nodal")]
+)
 def test_the_halves_of_a_ball_go_back_to_their_shape_and_volume(body):
     record = measure(Case(BALL_BISECTED, body, ImplicitVolume(), dt_fraction=0.8, recorded=("elastic", "kinetic")))
     assert record.status == "ok", record.message
@@ -223,6 +228,7 @@ def test_a_surface_body_is_recorded_and_measured_like_the_others(tmp_path):
     assert gap[0].max() == 0.0 and gap[-1].min() > 0.005
 
 
+@pytest.mark.campaign
 def test_a_piece_next_to_the_axis_gets_one_of_its_own_and_touches_the_rest():
     """The axis of a kidney is on one side of its cut, and the other side is pressed against it."""
     run = Run(case := Case(KIDNEY_BISECTED, SURFACE, ImplicitVolume(), dt_fraction=0.8), measure(case))

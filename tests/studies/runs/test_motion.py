@@ -54,6 +54,7 @@ def test_a_frequency_needs_more_than_a_few_values():
         fitted_frequency(np.linspace(0.0, 1.0, 11), np.zeros(11), 0.0)
 
 
+@pytest.mark.campaign
 def test_the_reference_rings_like_the_continuum(reference):
     """Lamb's is for small swings: one of 5 % and the linear field it starts with are 0.7 % slower on fine meshes."""
     frequency = reference.meshes[0].frequency

@@ -8,6 +8,7 @@ from studies.runs.case import BodyRecipe, Case
 from studies.runs.run import measure
 from studies.scene.library.ball_squeeze import BALL_SQUEEZE, DEPTH, PRESS_END, RADIUS
 from studies.store.record import Status
+from tests.campaigns import campaign
 
 SHARES = (0.05, 0.10, 0.15, 0.20, 0.25, 0.30)
 VERTICES = 150
@@ -31,7 +32,7 @@ def errors(contact: str, fraction: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("contact", "fraction"), [("nodes", 0.5), ("facets", 0.5)])
+@pytest.mark.parametrize(("contact", "fraction"), [campaign("nodes", 0.5), ("facets", 0.5)])
 def test_a_quadratic_ball_presses_as_the_incompressible_ball(contact, fraction, mesh_cache):
     """150 vertices on the surface: force within 2 % from a tenth of the diameter on, 4 % before, equator within 0.1 %.
 

@@ -31,6 +31,7 @@ from studies.scene.cut import Cut, nearest_cut
 from studies.scene.library.ball_bisected import BALL_BISECTED
 from studies.scene.library.ball_cut_twice import AWAY, BALL_CUT_TWICE, SECOND_AT
 from studies.scene.library.ball_incised import CUT_AT, HALF, MIDDLE, RADIUS
+from tests.campaigns import campaign
 
 pytestmark = pytest.mark.slow
 METRIC = {metric.name: metric for metric in METRICS}
@@ -57,6 +58,7 @@ def judged(tmp_path_factory) -> dict[str, Run]:
     return {kind: Run(case, measure(case), reference) for kind, case in cases.items()}
 
 
+@pytest.mark.campaign
 def test_both_incisions_gape_as_in_the_reference(judged):
     for kind, most, alike in (("tetrahedral", 20.0, 0.25), ("quadratic", 8.0, 0.08)):
         run = judged[kind]
@@ -76,6 +78,7 @@ def test_both_incisions_gape_as_in_the_reference(judged):
         assert truth[run.cut_of_pairs == 0].max() == pytest.approx(truth[run.cut_of_pairs == 1].max(), rel=0.01)
 
 
+@pytest.mark.campaign
 def test_page_and_view_compare_each_side_of_a_cut_with_its_own_side_of_the_reference(judged):
     run = judged["quadratic"]
     behind, front = run.cut_pairs.T
@@ -92,6 +95,7 @@ def test_page_and_view_compare_each_side_of_a_cut_with_its_own_side_of_the_refer
     assert errors_of(run, run.cut_pairs.ravel())["largest"] < 0.5 * wide.max()
 
 
+@pytest.mark.campaign
 def test_each_pair_belongs_to_the_cut_in_whose_plane_it_lies(judged):
     for run in judged.values():
         height = run.fields.rest[run.cut_pairs[:, 0], 2]
@@ -99,6 +103,7 @@ def test_each_pair_belongs_to_the_cut_in_whose_plane_it_lies(judged):
         assert np.abs(np.abs(height) - AWAY * RADIUS).max() < 1e-12
 
 
+@pytest.mark.campaign
 def test_the_error_of_the_opening_is_that_of_the_worse_cut(judged):
     run = judged["quadratic"]
     truth, weights = run.reference.opening(run.fields.rest[run.cut_pairs[:, 0]]), run.cut_weights
@@ -110,6 +115,7 @@ def test_the_error_of_the_opening_is_that_of_the_worse_cut(judged):
     assert METRIC["opening_error"](run) == pytest.approx(max(each)) and max(each) > 1.01 * min(each)
 
 
+@pytest.mark.campaign
 def test_the_reference_opens_one_cut_after_the_other(judged):
     """At each checkpoint the cuts before it are open and no other; with the second one never made, the second
     checkpoint has the same equilibrium."""
@@ -180,7 +186,7 @@ def test_mirrored_cuts_open_as_mirror_images(recipe, same):
     assert np.abs(gap[one] - gap[other] * [-1.0, -1.0, 1.0]).max() < same * RADIUS
 
 
-@pytest.mark.parametrize("recipe", [ONE, NODAL, QUADRATIC], ids=["one", "nodal", "quadratic"])
+@pytest.mark.parametrize("recipe", [ONE, NODAL, campaign(QUADRATIC)], ids=["one", "nodal", "quadratic"])
 def test_the_order_of_the_cuts_does_not_matter_once_all_is_at_rest(recipe):
     """One after the other, as both at once, and the other first: the same rest."""
     turned = replace(AT_ONCE, cuts=(replace(BELOW, at=SECOND_AT), replace(ABOVE, at=CUT_AT)))

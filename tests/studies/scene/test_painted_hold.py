@@ -38,6 +38,7 @@ def heights(points, patch):
     return np.abs(points[patch, 2]) / (CAP * RADIUS)
 
 
+@pytest.mark.campaign
 def test_both_solvers_hold_what_is_painted(scene):
     mesh = mesh_for(scene, LEVEL)
     fine, held, _ = reference_mesh(scene, LEVEL)

@@ -123,7 +123,7 @@ def test_a_case_that_ends_its_process_is_stored_and_the_rest_goes_on(organbench,
     assert code == 1 and "tiny: nothing ran" in out, "what failed is known, does not run again, and is not forgotten"
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_two_commands_on_one_folder_leave_what_one_leaves(finished_sweep, tmp_path):
     results, file = tmp_path / "results", tmp_path / "one.py"
     file.write_text("from tests.studies.tiny import tiny_case, tiny_study\nSTUDY = tiny_study(cases=(tiny_case(),))\n")

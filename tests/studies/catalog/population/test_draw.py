@@ -75,7 +75,7 @@ def test_nothing_is_clamped_where_a_probe_ends():
     assert np.linalg.norm(mesh.points[held] - end, axis=1).min() > probe.radius
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_the_coarsest_mesh_of_a_reference_is_clear_of_a_probe_that_is_clear_of_the_true_shape():
     """Liver 18: the probe stands .5 mm off the true shape, and a uniform mesh of 250 surface nodes bulged into it."""
     scene = member("liver", 0, 18)

@@ -103,7 +103,7 @@ def test_the_command_takes_the_file_as_it_was_taken(tmp_path):
         assert parts[4 : 4 + len(words)] == words and parts[4 + len(words) :][:4] == ["--nodes", "550", "--smooth", "3"]
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_a_real_organ_with_a_hole_and_turned_triangles(organbench, tmp_path, monkeypatch):
     raw = meshio.read(real_surface("spleen_hra_550"))
     faces = raw.cells_dict["triangle"].copy()
@@ -159,6 +159,7 @@ def test_grey_values_are_refused_by_all_three(organbench, tmp_path, monkeypatch)
         assert code == 2 and not out and "grey values" in err and "not a mask: segment it first" in err
 
 
+@pytest.mark.campaign
 def test_a_mask_has_a_plain_file_name_and_is_in_millimetres(organbench, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     axes = np.meshgrid(*[np.arange(-25.0, 26.0)] * 3, indexing="ij")

@@ -72,7 +72,7 @@ def test_the_number_that_is_named_has_been_tried():
     assert sentence.endswith(f"; {counts[-1]:,} nodes do not keep it within 1 % and 0.5 % either")
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_an_organ_is_meshed_without_faults(organbench, tmp_path):
     target = tmp_path / "kidney.vtu"
     code, out, err = organbench("mesh", "kidney", "--nodes", 200, "--seed", 3, "-o", target)
@@ -108,6 +108,7 @@ def test_a_file_is_mended_remeshed_and_filled(organbench, tmp_path):
     assert 0 < stored_numbers["file_to_mesh_max"] < 0.02 * stored_numbers["diagonal"]
 
 
+@pytest.mark.campaign
 def test_a_scan_can_be_hollow_and_in_millimetres(organbench, egg, tmp_path):
     target = tmp_path / "hollow.vtu"
     words = ("mesh", "--from", egg, "--unit", "mm", "--nodes", 200, "--wall", 4, "--write-unit", "mm", "-o", target)
@@ -127,6 +128,7 @@ def test_curved_elements_on_request(organbench, tmp_path):
     assert f"lumen {1e6 * (4 / 3 * np.pi * 0.042**3):.3g}" in out
 
 
+@pytest.mark.campaign
 def test_a_scan_can_be_curved(organbench, egg, tmp_path):
     target = tmp_path / "curved.vtu"
     words = ("mesh", "--from", egg, "--unit", "mm", "--nodes", 100, "--order", 2, "-o", target)
@@ -243,7 +245,7 @@ def test_on_a_terminal_it_asks_for_the_unit_and_before_large_files(organbench, e
     assert code == 0 and "warning: it is large" in err
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_real_organs_by_the_command(organbench, tmp_path):
     path = real_surface("spleen_hra_550")
     target = tmp_path / "spleen.vtu"

@@ -58,9 +58,9 @@ SMALLER = {
 """Changes to the scene file: it runs in two minutes, on small reference meshes, with bodies as coarse as can be."""
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 @pytest.mark.filterwarnings("ignore::UserWarning")
-@pytest.mark.parametrize("whole", [False, pytest.param(True, marks=pytest.mark.campaign)])
+@pytest.mark.parametrize("whole", [False, True])
 def test_the_page_is_followed(organbench, scan_file, kidney, whole):
     """Up to what the run would be, and to its report."""
     folder = scan_file.parent

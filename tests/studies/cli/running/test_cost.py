@@ -58,7 +58,12 @@ def test_what_is_left_out_is_named(squeezed):
 
 
 LEFT_OUT = [
-    pytest.param(skip, method, id=f"{method.name}-{skip.name.split(':')[0]}")
+    pytest.param(
+        skip,
+        method,
+        id=f"{method.name}-{skip.name.split(':')[0]}",
+        marks=pytest.mark.campaign if skip.name.startswith("pairs") else (),  # the mesh of a stomach
+    )
     for skip in SKIPS
     for method in (Free(), ImplicitVolume())
     if method.capabilities.keeps != "none" or not skip.name.startswith("linear solve")
@@ -83,6 +88,7 @@ def test_leaving_a_stage_out_changes_no_answer(skip, method):
         assert np.array_equal(without.x, with_stage.x) and np.array_equal(without.v, with_stage.v)
 
 
+@pytest.mark.campaign
 def test_the_table_counts_the_pairs_that_sleep(mesh_cache):
     """Of the thin probe on the stomach nearly all pairs sleep, and the line says what was still compared."""
     table = cost_table(tiny_case(scene=STOMACH_SLIDE, body=BodyRecipe("surface", 300)), repeats=1)

@@ -83,7 +83,7 @@ def test_killed_half_way_goes_on_where_it_was(tmp_path):
     finish(tmp_path)
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_ctrl_c_half_way_goes_on_where_it_was(tmp_path):
     process = interrupted(tmp_path, signal.SIGINT)
     _, errors = process.communicate(timeout=60)

@@ -103,6 +103,7 @@ def test_held_nodes_go_their_way(tmp_path, mesh_cache):
     assert given.along(np.array([1.0, 2.0, -3.0])) == pytest.approx(3.0)
 
 
+@pytest.mark.campaign
 def test_the_probe_of_the_liver_starts_between_the_nodes_of_a_coarse_mesh(tmp_path, mesh_cache):
     """docs/league.md: on liver_probe a program whose nodes alone touch feels nothing for the first third of the way."""
     export(LIVER_PROBE, tmp_path / "scene", 150)

@@ -27,6 +27,7 @@ def test_all_have_the_same_scene_and_an_update_is_a_step():
     assert history.outcome == "finished" and np.abs(history.held_force[-1, 1, 2]) > 0
 
 
+@pytest.mark.campaign
 def test_the_same_body_is_moved_alike():
     """The upper cap comes down: both follow it, but for what backward Euler takes of the first wave (12 %)."""
     ends = [simulate(update_setup(QUADRATIC, method)).final for method in (ImplicitVolume(), ImplicitElements())]

@@ -20,6 +20,7 @@ def swinging() -> Setup:
     return Setup(body, ImplicitVolume(), clock, velocity=2.0 * body.rest @ field.T, damping=1.0)
 
 
+@pytest.mark.campaign
 def test_the_plain_step_makes_the_same_motion(swinging):
     history = simulate(swinging)
     _, x = plain_points.plain_points_run(swinging)

@@ -41,6 +41,7 @@ def test_a_file_beside_the_physics(results):
     assert "frame_ns" not in read_record(physics).fields
 
 
+@pytest.mark.campaign
 def test_timing_again_leaves_the_physics_alone(results):
     before = content(results / "tiny")
     time_cases(results, "tiny", [KEPT], lambda name: None)

@@ -56,6 +56,7 @@ def test_charts_and_tables_are_drawn_again_on_another_machine_by_other_code(unpa
     assert (table.read_bytes(), chart.read_bytes()) == before
 
 
+@pytest.mark.campaign
 def test_the_code_in_it_draws_by_itself(unpacked, tmp_path):
     """A process that knows no other code of organbench."""
     table = unpacked / "tiny" / "tiny.csv"

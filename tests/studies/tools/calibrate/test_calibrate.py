@@ -34,7 +34,7 @@ def made(solved, tmp_path_factory):
     return folder, calibrate("ball", BODY, folder, progress=progress, folds=FOLDS), progress
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_the_factor_is_the_one_that_the_first_error_asks_for(made):
     """Forces of a slow press grow in proportion to the springs: F_ref/F = 1/(1 + e/100). Drag does not grow with them,
     up to 2 % of the force."""

@@ -16,6 +16,7 @@ from studies.store.ledger import Ledger
 from studies.tools.calibrate.fit import DIFFERENCE, fit
 from studies.tools.calibrate.measured import Measurements
 from studies.tools.calibrate.parameters import INNER_WEIGHT, STIFFNESS, parameters_of, scaled, weights_of
+from tests.campaigns import campaign
 from tests.studies.tiny import NODES, SQUEEZE
 from tests.studies.tools.calibrate import made_up_errors
 from tests.studies.tools.calibrate.made_up_errors import judged
@@ -100,7 +101,7 @@ def test_the_end_of_the_range_is_named():
     assert fitted.at_bound == ("stiffness",) and 90.0 < fitted.recipe.stiffness <= 100.0
 
 
-@pytest.mark.parametrize("body", [SOLID, SURFACE], ids=["tetrahedral", "surface"])
+@pytest.mark.parametrize("body", [SOLID, campaign(SURFACE)], ids=["tetrahedral", "surface"])
 def test_springs_half_as_stiff_are_fitted_back(tmp_path, body):
     """The truth is the force of the same body with its full stiffness, which runs measure: nothing is assumed of how
     forces grow with it."""

@@ -139,7 +139,7 @@ def test_results_that_are_damaged_or_of_another_version(results):
     assert bad.mend == f"organbench run tiny --only stale --results {results}"
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_the_command_ends_with_0_here_and_with_1_where_something_is_missing(tmp_path):
     command = [sys.executable, "-m", "studies", "doctor", "--results", str(tmp_path / "results")]
     env = {**os.environ, "PYTHONPATH": str(ROOT)}

@@ -21,6 +21,7 @@ def deadly(attempt, trials):
     return [Outcome(trial, "ok", "", 0.0) for trial in trials]
 
 
+@pytest.mark.campaign
 def test_a_process_that_dies_costs_its_trial_alone(monkeypatch):
     monkeypatch.setattr(campaign, "CHUNK", 2)
     monkeypatch.setattr(campaign, "try_all", deadly)

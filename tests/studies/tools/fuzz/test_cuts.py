@@ -149,7 +149,7 @@ class _History:
         self.final = snapshots[-1]
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_the_command_tells_and_writes(organbench, tmp_path):
     code, out, err = organbench("fuzz", "--cuts", "--cases", 2, "--seed", 11, "--jobs", 1, "--results", tmp_path)
     assert code == 0, out + err

@@ -87,7 +87,7 @@ def test_bodies_weigh_what_beam_and_load_weigh(kind):
     assert body.mass.sum() == pytest.approx(DENSITY * LENGTH * SIDE**2 + 0.51012 / GRAVITY, rel=1e-12)
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_both_solvers_let_the_same_beam_swing():
     """Sag and frequency of the quadratic body within 1 % of the reference on one mesh, with 52 g at the tip."""
     from studies.tools.silicone.beam import reference_rest, reference_swing
