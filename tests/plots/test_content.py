@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from massspring import Free
+from studies.metrics.metric import Metric
 from studies.plots import accuracy, force_path, methods, uncertainty, volume_history
 from studies.plots import work_precision as work
-from studies.plots.style.page import UNRESOLVED_MARK
+from studies.plots.style.page import UNRESOLVED_MARK, unresolved_notes
 from studies.plots.style.style import BLACK, BLUE, ORANGE, VERMILLION
 from studies.reference.uncertainty import Uncertainty
 from studies.scene.library.ball_clamped import BALL_CLAMPED
@@ -137,8 +138,26 @@ def test_a_reference_that_is_not_ten_times_better_is_marked(chart):
     assert UNRESOLVED_MARK not in text(3.0)
     assert f"Ball clamped {UNRESOLVED_MARK}" in text(0.05)
     note = text(0.05).split(f"{UNRESOLVED_MARK} Ball clamped: the uncertainty of the reference is ")[1]
-    assert note.startswith(("up to", "as large as"))
+    assert note.startswith(("up to", "at least as large as"))
     assert "force" in note
+
+
+def test_a_note_gives_each_metric_the_share_of_its_own_smallest_error():
+    """The force is known to a third of its error, the surface no better than the smaller of its two errors, and the
+    silhouette well enough."""
+    given = {"force": (30.0, 60.0), "surface": (5.0, 40.0), "silhouette": (200.0, 300.0)}
+    bars = {"force": 10.0, "surface": 6.0, "silhouette": 1.0}
+
+    def metric(name):
+        return Metric(f"{name}_error", "%", "lower", lambda one: given[name][one is not runs[0]], name)
+
+    runs = [run(BALL_CLAMPED, error=error) for error in (0.1, 0.2)]
+    for one in runs:
+        one.reference.total_uncertainty.update({name: bar / 100 for name, bar in bars.items()})
+    assert unresolved_notes(runs, [metric(name) for name in given]) == [
+        f"{UNRESOLVED_MARK} Ball clamped: the uncertainty of the reference is up to 33 % of the force error, "
+        "at least as large as the smallest surface error."
+    ]
 
 
 def error_bar(order=2.0, mesh=0.01):

@@ -130,17 +130,20 @@ def remarks(runs: Sequence[Run]) -> list[str]:
 
 
 def unresolved_notes(runs: Sequence[Run], metrics: Sequence[Metric]) -> list[str]:
-    """A note for each scene in which the uncertainty of the reference is over a tenth of an error of these metrics."""
+    """A note for each scene in which the uncertainty of the reference is over a tenth of an error of these metrics: its
+    share of the smallest error of each such metric."""
     notes = []
     for name, group in by_scene(runs).items():
-        weak = [metric for metric in metrics if any(metric.unresolved(run) for run in group)]
-        if weak:
-            worst = max(_share(metric, run) for metric in weak for run in group if metric.unresolved(run))
-            what = ", ".join(readable(metric.name) for metric in weak)
-            percent = f"up to {100 * worst:.0f} % of" if worst < 1 else "as large as"
-            notes.append(
-                f"{UNRESOLVED_MARK} {heading(name)}: the uncertainty of the reference is {percent} the {what}."
-            )
+        parts = []
+        for metric in metrics:
+            shares = [_share(metric, run) for run in group if metric.unresolved(run)]
+            if shares:
+                most = max(shares)
+                share = f"up to {100 * most:.0f} % of the" if most < 1 else "at least as large as the smallest"
+                parts.append(f"{share} {readable(metric.name)}")
+        if parts:
+            whose = f"{UNRESOLVED_MARK} {heading(name)}: the uncertainty of the reference is"
+            notes.append(f"{whose} {', '.join(parts)}.")
     return notes
 
 
