@@ -11,6 +11,7 @@ from matplotlib.ticker import MaxNLocator
 
 from massspring import Trajectory
 from studies.base.counting import heading
+from studies.metrics.cells import signed_percent
 from studies.metrics.metric import COMPARABLE
 from studies.metrics.metrics import METRICS, force_end
 from studies.metrics.run import Run, by_scene
@@ -33,7 +34,7 @@ from studies.plots.style.style import BLACK, GREY, SMALL, drawing, styled
 from studies.runs.case import BodyRecipe
 from studies.scene.library import Scene
 
-TITLE = "Force of the press against the reference"
+TITLE = "Force against the reference"
 CUT_TITLE = "Force on the end that is moved, of a body that is cut, against the reference"
 FORCES = [metric for metric in METRICS if metric.name == "force_end"]
 """Metrics that are written at the ends of the lines."""
@@ -56,7 +57,7 @@ def figure(runs: Sequence[Run]) -> Figure:
     reference = reference_handle(linestyle="-", linewidth=1)
     handles = [*body_method_handles(shown, looks), reference, band_handle("± its uncertainty")]
     cut = any(run.case.scene.cuts for run in shown)
-    dotted = "the cut, and the end of the motion" if cut else "the press stops"
+    dotted = "the cut, and the end of the motion" if cut else "the motion ends"
     notes = [f"At the end of each line: its error there, once everything is at rest. Dotted: {dotted}."]
     return finish(
         sheet,
@@ -89,10 +90,15 @@ def _draw_scene(axes: Axes, group: Sequence[Run], looks: dict[BodyRecipe, BodyLo
 
 
 def _way(run: Run, motion: Trajectory) -> str:
-    """How far the probed body moves, an obstacle from its first contact, in words: "20 mm ".
+    """How far the probed body moves, an obstacle from its first contact, in words: "20 mm "; "2 × 15 mm " where another
+    one comes as far from the other side.
 
     Empty for an obstacle without a reference: its nodes give the first contact, which a coarse body misses.
     """
+    bodies = run.case.scene.obstacles if run.case.scene.probed.what == "obstacle" else run.case.scene.held
+    opposite = -np.array(motion.displacements)
+    facing = [other for other in bodies if np.array_equal(other.path.displacements, opposite) and opposite.any()]
+    times = "2 × " if facing else ""
     way = float(np.linalg.norm(motion.displacements[-1]))
     if run.case.scene.probed.what == "obstacle":
         if run.reference is None:
@@ -100,7 +106,7 @@ def _way(run: Run, motion: Trajectory) -> str:
         press, corners = run.case.scene.obstacles[run.case.scene.probed.number], run.reference.field("nodes")
         signs = np.array(list(product((1.0, -1.0), repeat=3))) if run.case.scene.symmetric else np.ones((1, 3))
         way -= float(press.gap((signs[:, None] * corners).reshape(-1, 3), 0.0).min())
-    return f"{round(1e3 * way, 1):g} mm "
+    return f"{times}{round(1e3 * way, 1):g} mm "
 
 
 def _motion(scene: Scene) -> Trajectory:
@@ -114,7 +120,7 @@ def _error(run: Run) -> str:
         return str(run.record.status)
     if run.reference is None:
         return f"{run.force[run.checkpoint_frames[-1]]:.2g} N"
-    return f"{force_end(run):+.0f} %".replace("-", "−")
+    return signed_percent(force_end(run))
 
 
 def _label(axes: Axes, ends: Sequence[tuple[float, str, str]], low: float, top: float) -> None:

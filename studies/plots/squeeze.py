@@ -11,6 +11,7 @@ from scipy.spatial import ConvexHull
 
 from massspring import Plane
 from studies.base.counting import readable
+from studies.metrics.cells import MINUS, signed_percent
 from studies.metrics.metric import COMPARABLE
 from studies.metrics.metrics import force_end, volume_end, volume_worst
 from studies.metrics.run import Run
@@ -19,13 +20,14 @@ from studies.plots.style.render import Camera, draw_surface, frame, scale_bar, u
 from studies.plots.style.style import BLACK, GREY, NORMAL, SMALL, drawing, method_colour, method_label, styled
 
 TITLE = "A soft ball between two planes"
-SCENE, BODY = "ball_squeeze", "tetrahedral"
+SCENE, KINDS = "ball_squeeze", ("tetrahedral", "quadratic")
 CAMERA = Camera(azimuth=-62.0, elevation=9.0)
 PLATE, THICK = 1.40, 0.05
 """Radius and thickness of the discs that represent planes, over the radius of the ball."""
 PALER = 0.22
 REST, STEEL, GLASS = "#E8DCC8", "#8C8C8C", "#BFD3DC"
 NAMES = {"free": "Springs alone", "implicit_volume": "Volume kept"}
+"""Of methods, on a body of springs; the others come after them."""
 KEPT = 0.05
 """If the volume never changes by this much [%], an upper bound of the change is given as a power of ten."""
 DPI = 150
@@ -56,22 +58,23 @@ def figure(runs: Sequence[Run]) -> Figure:
         _draw_ball(axes[-1], some, *reference.surface(), STEEL)
         change = 100 * float(reference.field("volume")[-1] - 1)
         spread = 100 * reference.total_uncertainty["force_end"]
-        words = [f"volume {change:+.3f} %".replace("-", "−"), f"force {reference.force[-1]:.2f} N (± {spread:.1g} %)"]
+        words = [f"volume {change:+.3f} %".replace("-", MINUS), f"force {reference.force[-1]:.2f} N (± {spread:.1g} %)"]
         _caption(axes[-1], "Finite-element reference", words, BLACK)
     size = _radius(some)
     scale_bar(axes[0], -PLATE * size, -1.33 * size, 0.05, "50 mm", size=SMALL)
-    notes = _notes(some, outline is not None)
+    notes = _notes(squeezed, outline is not None)
     return finish(sheet, TITLE, [], notes)
 
 
 def _chosen(runs: Sequence[Run]) -> list[Run]:
-    """The run of SCENE with BODY that has reached its last checkpoint, one per method: that with the largest step."""
-    by_method: dict[str, Run] = {}
+    """The runs of SCENE that have reached their last checkpoint, one per kind of body and method: that with the
+    largest step."""
+    chosen: dict[tuple[str, str], Run] = {}
     for run in sorted(runs, key=lambda run: -run.record.attributes.get("dt", 0.0)):
         case = run.case
-        if case.scene.name == SCENE and case.body.kind == BODY and run.record.status in COMPARABLE:
-            by_method.setdefault(case.method.name, run)
-    return [by_method[name] for name in sorted(by_method, key=lambda name: (name not in NAMES, name))]
+        if case.scene.name == SCENE and case.body.kind in KINDS and run.record.status in COMPARABLE:
+            chosen.setdefault((case.body.kind, case.method.name), run)
+    return [chosen[key] for key in sorted(chosen, key=lambda key: (KINDS.index(key[0]), key[1] not in NAMES, key[1]))]
 
 
 def _radius(run: Run) -> float:
@@ -80,15 +83,16 @@ def _radius(run: Run) -> float:
 
 def _words(run: Run) -> tuple[str, list[str]]:
     force = float(run.force[run.checkpoint_frames[-1]])
-    error = "" if run.reference is None else f" ({force_end(run):+.0f} %)".replace("-", "−")
+    error = "" if run.reference is None else f" ({signed_percent(force_end(run))})"
     lines = [volume_words(volume_end(run), volume_worst(run)), f"force {force:.2f} N{error}"]
-    return NAMES.get(run.case.method.name, method_label(run.case.method.name)), lines
+    name = NAMES.get(run.case.method.name, method_label(run.case.method.name))
+    return f"Quadratic, {name.lower()}" if run.case.body.kind == "quadratic" else name, lines
 
 
 def volume_words(end: float, worst: float) -> str:
     """In words: the volume change at the `end` [%], or an upper bound of the `worst` [%] if that is below KEPT."""
     if worst >= KEPT:
-        return f"volume {end:+.1f} %".replace("-", "−")
+        return f"volume {signed_percent(end)}"
     worst = max(worst, 1e-14)  # about the resolution of double precision [%]
     power = int(np.floor(np.log10(worst)))
     digit = int(np.ceil(worst / 10.0**power))
@@ -140,11 +144,19 @@ def _caption(axes: Axes, title: str, lines: Sequence[str], colour: str) -> None:
     )
 
 
-def _notes(run: Run, outlined: bool) -> list[str]:
-    scene = run.case.scene
-    spread = f"{scene.title}; shear modulus {scene.tissue.shear_modulus / 1e3:g} kPa, "
-    spread += f"{run.record.attributes['nodes']:,} nodes, {run.record.attributes['springs']:,} springs."
-    return [spread + (" Dashed: outline of the reference." if outlined else " There is no reference yet.")]
+def _notes(runs: Sequence[Run], outlined: bool) -> list[str]:
+    scene = runs[0].case.scene
+    sizes = dict.fromkeys(
+        f"{run.record.attributes['nodes']:,} nodes"
+        + (
+            ", quadratic elements"
+            if run.case.body.kind == "quadratic"
+            else f", {run.record.attributes['springs']:,} springs"
+        )
+        for run in runs
+    )
+    text = f"{scene.title}; shear modulus {scene.tissue.shear_modulus / 1e3:g} kPa; {'; '.join(sizes)}."
+    return [text + (" Dashed: outline of the reference." if outlined else " There is no reference yet.")]
 
 
 draw = drawing(figure, DPI)

@@ -45,8 +45,9 @@ def figure(uncertainties: Mapping[str, Mapping[str, Uncertainty]]) -> Figure:
     log_axis(axes[0, 0].xaxis)
     axes[0, 0].set_xlim(0.5 * LOWEST, 3 * max(top, LOWEST))
     axes[0, 0].invert_yaxis()
-    for panel in axes[-1]:
+    for panel in axes.flat[: len(uncertainties)][-axes.shape[1] :]:  # the lowest of each column
         panel.set_xlabel("relative uncertainty [%]")
+        panel.tick_params(labelbottom=True)
     return finish(sheet, TITLE, _handles(), _notes(uncertainties), columns=3)
 
 
@@ -79,7 +80,8 @@ def _handles() -> list:
 
 def _notes(uncertainties: Mapping[str, Mapping[str, Uncertainty]]) -> list[str]:
     orders = [u.order for quantities in uncertainties.values() for u in quantities.values() if u.order == u.order]
-    seen = f" Observed orders {np.min(orders):.2g} to {np.max(orders):.2g}." if orders else ""
+    ends = list(dict.fromkeys(f"{end(orders):.2g}" for end in (np.min, np.max))) if orders else []
+    seen = f" Observed {'order' if len(ends) == 1 else 'orders'} {' to '.join(ends)}." if ends else ""
     return [
         "Bar: root of the sum of the squares of the shares; the other charts show it as the uncertainty. Settings are "
         f"changed on the coarsest mesh. Shares below {LOWEST:g} % are drawn there.{seen}"

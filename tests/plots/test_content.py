@@ -71,7 +71,7 @@ def test_many_scenes_stand_in_rows_of_four():
     assert [axes.get_title() for axes in drawn if axes.get_title()] == [f"Ball {k}" for k in range(5)]
 
 
-@pytest.mark.parametrize(("error", "label"), [(0.25, "−25 %"), (-0.1, "+10 %")])
+@pytest.mark.parametrize(("error", "label"), [(0.25, "−25 %"), (-0.1, "+10 %"), (0.0042, "−0.4 %"), (0.0004, "0.0 %")])
 def test_force_error_stands_at_the_end_of_its_line(error, label):
     assert label in words(force_path.figure([run(error=error)]))
 
@@ -175,6 +175,13 @@ def test_shares_of_an_error_bar_are_drawn_where_they_are():
     assert f"{100 * error_bar().total:.2g}" in words(figure)
     assert [label.get_text() for label in panel.get_yticklabels()] == ["force", "interior"]
     assert panel.get_ylim()[0] > panel.get_ylim()[1]
+    assert "Observed order 2." in words(figure)
+
+
+def test_the_lowest_panel_of_each_column_has_its_axis():
+    figure = uncertainty.figure({f"scene_{k}": {"force": error_bar()} for k in range(3)})
+    labelled = [bool(axes.get_xlabel()) and axes.xaxis.get_ticklabels()[0].get_visible() for axes in figure.axes[:3]]
+    assert labelled == [False, True, True]
 
 
 def test_error_bars_stand_in_the_row_of_their_name():

@@ -92,6 +92,14 @@ def test_squeeze_rounds_a_kept_volume_up(worst, bound):
     assert f"volume kept within {bound} %" in words(squeeze.figure([run(volume_end=worst)]))
 
 
+def test_squeeze_shows_a_quadratic_body_after_those_of_springs():
+    figure = squeeze.figure([run(kind="quadratic", error=0.004), run(method=Free(), error=0.5), run(error=0.3)])
+    titles = [axes.get_title() for axes in figure.axes]
+    assert titles == ["At rest", "Springs alone", "Volume kept", "Quadratic, volume kept", "Finite-element reference"]
+    assert "(−0.4 %)" in words(figure.axes[3])
+    assert "nodes, quadratic elements. Dashed" in words(figure)
+
+
 def test_squeeze_takes_the_larger_of_two_steps():
     figure = squeeze.figure([run(dt=1e-4, volume_end=-0.02), run(dt=1e-3, volume_end=-0.03)])
     assert "−3.0 %" in words(figure)

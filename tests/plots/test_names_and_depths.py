@@ -34,7 +34,7 @@ def test_the_depth_is_that_of_the_scene_not_the_way_of_the_press(scene, deep):
 
 
 def test_the_first_touch_of_an_octant_may_lie_in_another_eighth():
-    assert ", 15 mm in" in title(BALL_SQUEEZE, np.array([[0.0, 0.0, 0.05], [0.05, 0.0, 0.0]]))
+    assert ", 2 × 15 mm in" in title(BALL_SQUEEZE, np.array([[0.0, 0.0, 0.05], [0.05, 0.0, 0.0]]))
 
 
 def test_without_a_reference_no_depth_is_given_and_a_held_region_has_its_whole_way():
