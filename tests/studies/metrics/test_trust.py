@@ -103,6 +103,7 @@ def test_the_study_of_a_scene_takes_the_nodes_that_its_warning_needs(scene):
     assert [case.body.nodes for case in bodies] == [1194, 1594] and not doubt(*bodies)
 
 
+@pytest.mark.campaign
 def test_a_body_that_warns_of_few_facets_is_not_trusted_however_near_two_meshes_are():
     """The words are those of the warning before the run."""
     with pytest.warns(UserWarning, match=FEW_FACETS) as records:

@@ -176,7 +176,7 @@ def test_without_an_equilibrium_refinement_stops_and_names_the_reason(mesh_cache
     assert reference.total_uncertainty["force_end"] > 0.03
 
 
-@pytest.mark.parametrize("number", [0, 3])
+@pytest.mark.parametrize("number", [campaign(0), 3])
 def test_a_mesh_whose_carried_states_lead_nowhere_is_solved_from_rest(mesh_cache, monkeypatch, number):
     """All of its checkpoints, whether the last one fails or another."""
     failing_from(monkeypatch, "continued", number, StepFailed("made to fail"))

@@ -50,6 +50,7 @@ def test_the_free_end_is_grasped_and_lifted_across_the_length(kidney):
     assert scenes["lifted"].probed.what == "held" and not scenes["lifted"].obstacles
 
 
+@pytest.mark.campaign
 def test_the_plane_starts_beside_the_body_and_goes_in(kidney):
     points, scenes = kidney
     (plane,) = scenes["pressed"].obstacles
@@ -59,6 +60,7 @@ def test_the_plane_starts_beside_the_body_and_goes_in(kidney):
     assert after.min() == pytest.approx(-PRESSED_IN * depth, rel=0.2)
 
 
+@pytest.mark.campaign
 def test_the_scenes_differ_in_name_and_load_alone(kidney):
     scenes = kidney[1]
     assert tuple(scenes) == LOADS and [one.name for one in scenes.values()] == [f"kidney_{load}" for load in LOADS]
@@ -66,6 +68,7 @@ def test_the_scenes_differ_in_name_and_load_alone(kidney):
     assert len({replace(one.reference, at_contact=0) for one in scenes.values()}) == 1
 
 
+@pytest.mark.campaign
 def test_finer_references_have_more_unknowns_and_nothing_else(kidney):
     """A plane touches many elements: none of them is halved beforehand."""
     for load, scene in kidney[1].items():

@@ -57,6 +57,7 @@ def test_outline_is_closed_and_on_the_edge_of_the_region(mesh_cache):
     np.testing.assert_allclose(nodes(mesh)[sides][..., 2], -CAP * RADIUS, rtol=1e-9)
 
 
+@pytest.mark.campaign
 def test_a_base_is_finer_where_the_probe_will_be_upright_and_still_held(mesh_cache):
     """Moving each new node onto the surface by itself folds elements; the solver refuses such a mesh."""
     sphere = LIVER_PROBE.obstacles[0]

@@ -59,6 +59,7 @@ def test_the_curved_body_has_the_volume_of_the_surface(scene):
     assert flat.volume < 0.97 * VOLUME
 
 
+@pytest.mark.campaign
 def test_a_graded_quadratic_body_is_on_the_same_shape(scene, shape):
     """Halved elements too: their nodes and mid-side nodes lie on the shape, those of outlines on the outline."""
     mesh = mesh_at(scene, LEVEL, 1, 0, True)
@@ -80,6 +81,7 @@ def test_sides_follow_the_true_shape_and_outlines_the_true_outline(scene, shape)
         assert (np.abs(points[patch, 2]) >= CAP * RADIUS * (1 - 1e-9)).all()
 
 
+@pytest.mark.campaign
 def test_all_meshes_have_one_shape(scene, shape, mesh_cache):
     """Nodes of one are on the shape of the other; the grid of the shape is stored once."""
     for level in (LEVEL, 150):

@@ -70,6 +70,7 @@ def test_a_factor_that_is_not_positive_is_refused(mesh):
         body_for(BALL_SQUEEZE, BodyRecipe(nodes=300, stiffness=0.0), mesh)
 
 
+@pytest.mark.campaign
 def test_a_hollow_organ_can_be_a_membrane():
     """As thick as the wall is in the mean, as heavy as wall and content, filled like the organ."""
     case = Case(BLADDER_FILL, BodyRecipe("membrane", nodes=400, law="delingette"), frames=20)

@@ -62,6 +62,7 @@ def test_the_reference_rings_like_the_continuum(reference):
     assert frequency < TRUE
 
 
+@pytest.mark.campaign
 def test_the_frequency_has_an_error_bar_of_meshes_and_time_steps(reference):
     bar = reference.uncertainty["frequency"]
     assert set(bar.shares) == {"mesh", "steps"}
@@ -71,6 +72,7 @@ def test_the_frequency_has_an_error_bar_of_meshes_and_time_steps(reference):
     assert set(reference.uncertainty) == {"frequency", "volume"}  # only what the scene lets be compared
 
 
+@pytest.mark.campaign
 def test_the_energy_of_the_motion_is_kept(reference):
     total = reference.field("kinetic") + reference.field("energy")
     assert np.all(np.isfinite(total))
@@ -80,6 +82,7 @@ def test_the_energy_of_the_motion_is_kept(reference):
     assert total[-1] / total[0] == pytest.approx(faded, abs=0.05)
 
 
+@pytest.mark.campaign
 def test_a_mass_spring_ball_is_judged_by_its_frequency(reference):
     case = Case(SCENE, BodyRecipe("tetrahedral", 150, volumes="nodal"))
     record = measure(case)

@@ -31,6 +31,7 @@ def kept():
     return slide_case(SMALL).method
 
 
+@pytest.mark.campaign
 def test_the_slide_is_stored_and_read_back(slide):
     assert scene_from_dict(json.loads(scene_to_json(STOMACH_SLIDE))) == STOMACH_SLIDE
     assert case_from_json(slide.case.key) == slide.case

@@ -95,7 +95,7 @@ REFUSED = {
 }
 
 
-@pytest.mark.parametrize("what", REFUSED)
+@pytest.mark.parametrize("what", campaigns_but(REFUSED, lambda what: what != "a lumen"))
 def test_a_scene_beyond_the_adapters_is_refused_with_its_reason(tmp_path, mesh_cache, what):
     scene, message = REFUSED[what]
     nodes = 400 if scene.lumen else NODES + 50
@@ -164,6 +164,7 @@ def test_each_program_squeezes_the_ball(reference, tmp_path, mesh_cache, peer):
     assert (table["penetration [%]"] < depth).all()
 
 
+@pytest.mark.campaign
 def test_an_environment_that_cannot_be_made_is_a_reason(tmp_path, mesh_cache):
     """pip gets a package that no index can have; the row says so, and the rest would go on."""
     peer = Peer("nowhere", "tests.studies.exchange.peers.dummy_unable", packages=("./not-a-folder-of-any-package",))

@@ -14,6 +14,7 @@ from studies.exchange.export import SOFA, export
 from studies.exchange.league.entry_file import judged_file, read_entry_file
 from studies.scene.library import BALL_CLAMPED, BALL_SQUEEZE, LIVER_PROBE
 from studies.store.record import Status
+from tests.campaigns import campaign
 
 NODES = 150
 
@@ -126,7 +127,7 @@ def test_the_clamped_ball_gets_its_components_and_its_held_nodes_move(scene_file
     assert root.run.probed(x, 1.0) > 0.0  # the cap presses on the elements below it
 
 
-@pytest.mark.parametrize("scene", [LIVER_PROBE, BALL_SQUEEZE], ids=lambda scene: scene.name)
+@pytest.mark.parametrize("scene", [campaign(LIVER_PROBE), BALL_SQUEEZE], ids=lambda scene: scene.name)
 def test_obstacles_move_and_push_with_the_law_of_the_component(scene_file, scene):
     sofa = scene_file(scene)
     root = sofa.createScene(Node("root"))

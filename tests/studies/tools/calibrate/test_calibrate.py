@@ -48,14 +48,14 @@ def test_the_factor_is_the_one_that_the_first_error_asks_for(made):
     assert outcome.parameters["stiffness"] == outcome.recipe.stiffness
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_the_final_recipe_lies_between_those_of_the_trials(made):
     _, outcome, _ = made
     low, high = sorted(trial.parameters["stiffness"] for trial in outcome.trials)
     assert low <= outcome.recipe.stiffness <= high and outcome.fitted == (DEEP.name, SHALLOW.name)
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_judged_errors_are_those_of_the_fitted_body(made):
     folder, outcome, _ = made
     runs = Measurements(Ledger(folder), (DEEP, SHALLOW))
@@ -67,7 +67,7 @@ def test_judged_errors_are_those_of_the_fitted_body(made):
     assert {trial.displacement for trial in outcome.trials} == {None}
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_it_is_stored_and_read_back(made):
     folder, outcome, _ = made
     path = calibration_path(folder, outcome)
@@ -75,7 +75,7 @@ def test_it_is_stored_and_read_back(made):
     assert read_calibration(path) == outcome and calibrated(path) == outcome.recipe
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_progress_counts_every_solve_and_fit(made):
     _, _, progress = made
     assert dict(progress.begun) == {"physics": 3, "fitting": 3}  # a reference and two first runs
@@ -101,7 +101,7 @@ def test_an_interrupted_calibration_goes_on(made, tmp_path, monkeypatch):
     assert calibrate("ball", BODY, again, folds=FOLDS) == outcome
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_a_body_that_ends_badly_from_the_start_is_named(made):
     folder, _, _ = made
     runs = Measurements(Ledger(folder), (DEEP,))
@@ -147,7 +147,7 @@ def test_a_hollow_organ_starts_with_a_bent_axis():
         starting_recipe("liver", "surfaces")
 
 
-@pytest.mark.slow
+@pytest.mark.campaign
 def test_errors_of_a_run_are_finite_or_not_compared(made):
     _, outcome, _ = made
     values = [errors.force for trial in outcome.trials for errors in trial.errors]
