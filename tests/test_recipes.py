@@ -231,7 +231,7 @@ def test_an_added_chart_keeps_the_contract(recipe, monkeypatch, tmp_path):
     (entry,) = test_contract.good_runs((study,)).items()
     assert entry[0] is chart
     monkeypatch.setitem(test_contract.GOOD, *entry)
-    odd = list(test_contract.ODD.values())
+    odd = list(test_contract.ODD)
     assert hold(test_contract, "chart", chart=[chart], runs=odd, tmp_path=[tmp_path]) == 7
 
 

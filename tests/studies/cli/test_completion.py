@@ -12,6 +12,7 @@ from studies.catalog.population import POPULATION
 from studies.cli.loading import COMMANDS, NAMES
 from studies.geometry.organs import SHAPES
 from studies.scene.library import CUT, SCENES
+from tests.campaigns import campaign
 
 ROOT = Path(__file__).parents[3]
 PROGRAM = """
@@ -44,8 +45,8 @@ def completed(*words: str) -> tuple[list[str], list[str]]:
         (("advise", "liver_pre"), ["liver_press"]),
         (("mesh", "kid"), ["kidney"]),
         (("mesh-check", "kid"), []),
-        (("table", "--all", "vol"), ["volume_loss"]),
-        (("table", "--csv", "vol"), []),
+        campaign(("table", "--all", "vol"), ["volume_loss"]),
+        campaign(("table", "--csv", "vol"), []),
         (("run", "--sm"), ["--smoke"]),
         (("nothing", "sta"), ["status"]),
     ],

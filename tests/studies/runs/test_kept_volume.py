@@ -10,7 +10,7 @@ from studies.report.kept_volume import PROMISED, kept_volumes, promised, worst_v
 from studies.runs.case import BodyRecipe, Case
 from studies.runs.current import case_path
 from studies.runs.run import measure
-from studies.scene.library import BALL_CLAMPED, BALL_SQUEEZE, JUDGED, LIVER_PRESS, STOMACH_PRESS
+from studies.scene.library import BALL_CLAMPED, BALL_SQUEEZE, BLADDER_FILL, JUDGED, LIVER_PRESS
 from studies.store.ledger import Ledger
 from studies.store.record import Status, read_record, write_record
 from tests.studies.tiny import SQUEEZE, bodies_of, diverging_case, tiny_case, tiny_study
@@ -42,7 +42,7 @@ def test_every_scene_keeps_its_volumes(scene, kind):
     assert record.attributes["capped_steps"] == 0
 
 
-MANY = (BALL_SQUEEZE, BALL_CLAMPED, LIVER_PRESS, STOMACH_PRESS)
+MANY = (BALL_SQUEEZE, BALL_CLAMPED, LIVER_PRESS, BLADDER_FILL)
 """Solid and hollow, held and free; the others, some of which take as long as all of these, are a campaign."""
 
 

@@ -39,6 +39,7 @@ def test_the_slide_is_stored_and_read_back(slide):
     assert 2 * NODES - 4 == 38_996  # triangles of a closed surface: the paper's 39,000, rounded
 
 
+@pytest.mark.campaign
 def test_the_probe_stays_outside_and_presses_while_it_slides(slide):
     """The tip of every frame lies outside the surface of that frame; the volume is kept all the way."""
     triangles = slide.prepared.setup.body.triangles
@@ -51,6 +52,7 @@ def test_the_probe_stays_outside_and_presses_while_it_slides(slide):
     assert np.abs(slide.history.volume / slide.history.volume_target - 1).max() < 1e-4
 
 
+@pytest.mark.campaign
 def test_what_is_drawn_of_the_slide_is_the_run(slide):
     figure = paper_slide.figure(slide)
     assert len(figure.axes) == 6

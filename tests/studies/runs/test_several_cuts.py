@@ -186,7 +186,8 @@ def test_mirrored_cuts_open_as_mirror_images(recipe, same):
     assert np.abs(gap[one] - gap[other] * [-1.0, -1.0, 1.0]).max() < same * RADIUS
 
 
-@pytest.mark.parametrize("recipe", [campaign(ONE), NODAL, campaign(QUADRATIC)], ids=["one", "nodal", "quadratic"])
+@pytest.mark.campaign
+@pytest.mark.parametrize("recipe", [ONE, NODAL, QUADRATIC], ids=["one", "nodal", "quadratic"])
 def test_the_order_of_the_cuts_does_not_matter_once_all_is_at_rest(recipe):
     """One after the other, as both at once, and the other first: the same rest."""
     turned = replace(AT_ONCE, cuts=(replace(BELOW, at=SECOND_AT), replace(ABOVE, at=CUT_AT)))
