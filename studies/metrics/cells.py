@@ -27,9 +27,3 @@ def plain(value: float, sign: str = "") -> str:
     """Three significant digits; whole numbers below a million without an exponent."""
     text = f"{value:{sign},.0f}" if 1e3 <= abs(value) < 1e6 else f"{value:{sign}.3g}"
     return text.replace("-", MINUS)
-
-
-def signed_percent(value: float) -> str:
-    """ "−35 %", "+0.3 %": whole from ten on, one digit below; "0.0 %" without a sign."""
-    text = f"{value:+.{1 if abs(value) < 9.95 else 0}f}"
-    return f"{'0.0' if text in ('+0.0', '-0.0') else text} %".replace("-", MINUS)

@@ -11,7 +11,6 @@ from matplotlib.ticker import MaxNLocator
 
 from massspring import Trajectory
 from studies.base.counting import heading
-from studies.metrics.cells import signed_percent
 from studies.metrics.metric import COMPARABLE
 from studies.metrics.metrics import METRICS, force_end
 from studies.metrics.run import Run, by_scene
@@ -26,6 +25,7 @@ from studies.plots.style.page import (
     panel_grid,
     reference_handle,
     remarks,
+    signed_percent,
     spread_out,
     unresolved_mark,
     unresolved_notes,

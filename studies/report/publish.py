@@ -23,6 +23,7 @@ from studies.report.published_code import (
     FILE,
     STALE,
     Finding,
+    chart_code,
     compared,
     note,
     scenes_code,
@@ -178,6 +179,7 @@ def _codes(studies: Sequence[Study], extras: Sequence[str], whole: bool = True) 
     that of the tables over all `studies`."""
     codes: dict[str, Callable[[], str]] = {study.name: partial(study_code, study) for study in studies}
     by_name = {study.name: study for study in studies}
+    codes |= {f"{study.name}/{one.file}": partial(chart_code, study, one) for study in studies for one in study.charts}
     codes |= {one.file: partial(text_code, by_name[one.study], one.text) for one in SUMMARIES if one.study in by_name}
     codes |= {name: partial(source_fingerprint, *EXTRAS[name].makers) for name in extras}
     if whole:
@@ -196,6 +198,7 @@ def check(home: Path, studies: Sequence[Study]) -> list[Finding]:
     if not target.is_dir():
         raise StudyError(f"there is no {target}; run the command in the folder of the project")
     commands = {study.name: command_line("run", [study]) for study in studies}
+    commands |= {f"{study.name}/{one.file}": commands[study.name] for study in studies for one in study.charts}
     commands |= {one.file: commands[one.study] for one in SUMMARIES if one.study in commands}
     commands |= {name: extra.command for name, extra in EXTRAS.items()}
     every = "make publish"

@@ -10,7 +10,7 @@ from pathlib import Path
 from massspring.sources import source_fingerprint
 from studies.base.atomic import write_whole
 from studies.base.errors import StudyError
-from studies.catalog.study import Study
+from studies.catalog.study import Chart, Study
 from studies.metrics.table import metric
 from studies.reference.published import fingerprint_of
 from studies.runs.case import Case
@@ -34,15 +34,23 @@ class Finding:
 
 
 def study_code(study: Study) -> str:
-    """Hash of what the tables and charts of a study are made by and of: its cases, the code that runs, judges, measures
-    and draws them, and their references."""
-    parts = [text for case in study.cases for text in (_key(case), case_fingerprint(case))]
-    parts += [fingerprint_of(scene) for scene in study.scenes]
-    drawings = [chart.drawing for chart in study.charts] + [metric(column).of for column in study.columns]
-    parts += [file.sha256 for file in map(file_of, drawings) if file is not None]
-    modules = {drawing.partition(":")[0] for drawing in drawings if isinstance(drawing, str)}
-    parts.append(source_fingerprint("studies.metrics.table", *sorted(modules)))
-    return _digest([*parts, *(metric(column).name for column in study.columns)])
+    """Hash of what the table of a study is made by and of: its cases, the code that runs, judges and measures them, and
+    their references."""
+    metrics = [metric(column) for column in study.columns]
+    files = [file.sha256 for file in map(file_of, (one.of for one in metrics)) if file is not None]
+    return _digest([*_runs(study), *files, source_fingerprint("studies.metrics.table"), *(one.name for one in metrics)])
+
+
+def chart_code(study: Study, chart: Chart) -> str:
+    """The same of a chart: of the runs, and the code that draws them."""
+    drawing, file = chart.drawing, file_of(chart.drawing)
+    module = drawing.partition(":")[0] if isinstance(drawing, str) else drawing.__module__
+    return _digest([*_runs(study), source_fingerprint(module) if file is None else file.sha256])
+
+
+def _runs(study: Study) -> list[str]:
+    cases = [text for case in study.cases for text in (_key(case), case_fingerprint(case))]
+    return cases + [fingerprint_of(scene) for scene in study.scenes]
 
 
 def text_code(study: Study, text: Callable) -> str:

@@ -13,7 +13,7 @@ from matplotlib.ticker import FuncFormatter
 from scipy.optimize import isotonic_regression
 
 from studies.base.counting import heading, readable
-from studies.metrics.cells import UNRESOLVED_MARK
+from studies.metrics.cells import MINUS, UNRESOLVED_MARK
 from studies.metrics.metric import Metric
 from studies.metrics.run import Run, by_scene
 from studies.plots.style.style import BLACK, GREY, SMALL, remark, styled
@@ -140,7 +140,8 @@ def unresolved_notes(runs: Sequence[Run], metrics: Sequence[Metric]) -> list[str
             if shares:
                 most = max(shares)
                 share = f"up to {100 * most:.0f} % of the" if most < 1 else "at least as large as the smallest"
-                parts.append(f"{share} {readable(metric.name)}")
+                what = readable(metric.name)
+                parts.append(f"{share} {what}" if what.endswith("error") else f"{share} {what} error")
         if parts:
             whose = f"{UNRESOLVED_MARK} {heading(name)}: the uncertainty of the reference is"
             notes.append(f"{whose} {', '.join(parts)}.")
@@ -223,3 +224,9 @@ def spread_out(heights: np.ndarray, gap: float, highest: float = np.inf) -> np.n
     room = max(highest - ladder[-1], 0.0) if len(ladder) else highest
     placed[order] = np.minimum(isotonic_regression(heights[order] - ladder).x, room) + ladder
     return placed
+
+
+def signed_percent(value: float) -> str:
+    """ "−35 %", "+0.3 %": whole from ten on, one digit below; "0.0 %" without a sign."""
+    text = f"{value:+.{1 if abs(value) < 9.95 else 0}f}"
+    return f"{'0.0' if text in ('+0.0', '-0.0') else text} %".replace("-", MINUS)

@@ -265,7 +265,7 @@ def test_what_is_published_is_current_until_the_code_that_makes_it_changes(curre
     set_stamp(current, "bench.csv")
     publish(current, [HEADLINE], home)
     block = f"{PAGE}, {BEGIN}"
-    names = ["volume_loss", "summary.md", "bench.csv", "kept_volume.csv", block]
+    names = ["volume_loss", "volume_loss/one.png", "summary.md", "bench.csv", "kept_volume.csv", block]
     assert status_of(home, HEADLINE) == dict.fromkeys(names, CURRENT)
     # Another case, another table.
     other = replace(HEADLINE, cases=HEADLINE.cases[:-1])
@@ -286,6 +286,15 @@ def test_other_code_of_a_run_makes_a_study_stale(current, home, monkeypatch):
     assert noted(home / PUBLISHED)["volume_loss"] == study_code(HEADLINE)
     monkeypatch.setattr(runs, "run_fingerprint", lambda: "another code")
     assert status_of(home, HEADLINE)["volume_loss"] == STALE
+
+
+def test_other_code_of_a_chart_makes_the_chart_stale_and_not_its_table(current, home):
+    publish_some(current, [HEADLINE], home)
+    chart = HEADLINE.charts[0]
+    assert f"{HEADLINE.name}/{chart.file}" in noted(home / PUBLISHED)
+    other = replace(HEADLINE, charts=(replace(chart, drawing="studies.plots.pieces:draw"), *HEADLINE.charts[1:]))
+    stale = {name for name, status in status_of(home, other).items() if status == STALE}
+    assert stale == {f"{HEADLINE.name}/{chart.file}"}
 
 
 def test_other_code_of_a_text_makes_the_text_stale_and_not_its_study(current, home, monkeypatch):
