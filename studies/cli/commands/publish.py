@@ -41,10 +41,10 @@ def publish(
 
 
 def check_published(names: list[str]) -> None:
-    """Says of all that is published, or of these names, whether the present code would make it. Exit code 1: something
-    is not current."""
+    """Says of all that is published, or of these names and what lies in their folders, whether the present code would
+    make it. Exit code 1: something is not current."""
     findings = publishing.check(Path("."), [*STUDIES, find_study(POPULATION)])
-    shown = [one for one in findings if not names or one.name in names]
+    shown = [one for one in findings if not names or one.name in names or one.name.split("/")[0] in names]
     for one in shown:
         say(f"{one.name}: {one.status}" + (f", {one.words}" if one.words else ""))
     behind = [one for one in shown if one.status != CURRENT]

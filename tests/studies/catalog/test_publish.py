@@ -316,11 +316,11 @@ def test_the_command_says_what_is_behind_with_exit_code_1(current, home, organbe
     monkeypatch.setattr(command, "STUDIES", (HEADLINE,))
     publish_some(current, [HEADLINE], home)
     code, out, _ = organbench("publish", "--check")
-    assert code == 0 and "volume_loss: current" in out and "3 of 3 are current" in out
+    assert code == 0 and "volume_loss: current" in out and "4 of 4 are current" in out
     (home / PUBLISHED / FILE).write_text("{}")
     code, out, _ = organbench("publish", "volume_loss", "--check")
     assert code == 1 and "volume_loss: unknown, published before its code was noted; run `organbench run" in out
-    assert "0 of 1 are current" in out
+    assert "volume_loss/one.png: unknown" in out and "0 of 2 are current" in out
 
 
 @pytest.mark.usefixtures("small_population")
