@@ -62,7 +62,7 @@ def measured(case: Case) -> pd.DataFrame:
     kinds = {kind: place for place, kind in enumerate(HEADINGS)}
     costs = costs.sort_index(level="kind", key=lambda level: level.map(kinds), sort_remaining=False, kind="stable")
     mean, spread = costs.mean(axis=1), 0.5 * (costs.max(axis=1) - costs.min(axis=1))
-    step = float(mean[STAGE, WHOLE])
+    step = float(mean.to_dict()[STAGE, WHOLE])
     columns = {COST: mean, SHARE: mean / step, "how much": remarks.reindex(costs.index), SPREAD: spread}
     return pd.DataFrame(columns).reset_index()
 
