@@ -100,7 +100,7 @@ def test_the_table_counts_the_pairs_that_sleep(mesh_cache):
 
 
 def test_the_command_prints_a_table_or_json(organbench, tmp_path, monkeypatch):
-    monkeypatch.setenv("COLUMNS", "120")  # large costs would wrap the names of what is skipped
+    monkeypatch.setattr(profile.console, "_width", 120)  # long numbers would wrap the names of what is skipped
     words = ("profile", "ball_clamped", "--nodes", HELD.nodes, "--method", "free")
     code, out, _ = organbench(*words, "--csv", tmp_path / "cost.csv")
     assert code == 0 and "springs and prediction" in out and NO_CONTACT in out
