@@ -144,17 +144,15 @@ def _caption(axes: Axes, title: str, lines: Sequence[str], colour: str) -> None:
     )
 
 
+def _size(run: Run) -> str:
+    springs = f"{run.record.attributes['springs']:,} springs"
+    filled = "quadratic elements" if run.case.body.kind == "quadratic" else springs
+    return f"{run.record.attributes['nodes']:,} nodes, {filled}"
+
+
 def _notes(runs: Sequence[Run], outlined: bool) -> list[str]:
     scene = runs[0].case.scene
-    sizes = dict.fromkeys(
-        f"{run.record.attributes['nodes']:,} nodes"
-        + (
-            ", quadratic elements"
-            if run.case.body.kind == "quadratic"
-            else f", {run.record.attributes['springs']:,} springs"
-        )
-        for run in runs
-    )
+    sizes = dict.fromkeys(map(_size, runs))
     text = f"{scene.title}; shear modulus {scene.tissue.shear_modulus / 1e3:g} kPa; {'; '.join(sizes)}."
     return [text + (" Dashed: outline of the reference." if outlined else " There is no reference yet.")]
 
