@@ -42,17 +42,17 @@ publish-plan: setup-run ## what `make publish` would do, and how long it takes
 
 verify: setup-verify docs ## before a release: oracles, campaigns, browsers, clusters, wheels, notebooks (half an hour)
 	$(BIN)/organbench verify
-	$(PYTEST) -m campaign
+	$(PYTEST) -m "campaign or lab"
 
 smoke: setup-run ## the main studies with their smallest settings: a quick check of the whole chain
 	$(BIN)/organbench run --smoke
 
-test: setup-test compiled ## every test but the campaigns, which `make verify` runs
-	$(PYTEST) -m "not campaign"
+test: setup-test compiled ## every test but the campaigns and those of the lab, which `make verify` runs
+	$(PYTEST) -m "not campaign and not lab"
 
 # Asked for both, `make check test` leaves the fast tests to `test`.
 check: lint links setup-dev ## lint, types, import contracts, links of the docs and the fast tests
-	$(if $(filter test,$(MAKECMDGOALS)),,$(PYTEST) -m "not slow and not campaign")
+	$(if $(filter test,$(MAKECMDGOALS)),,$(PYTEST) -m "not slow and not campaign and not lab")
 
 lint: setup-dev ## ruff, pyright and the import contracts alone
 	$(BIN)/ruff check .
@@ -93,7 +93,7 @@ speeds: setup-run ## the promised speeds of the last commit against those of OLD
 	$(ASV) compare $$(git rev-parse $(OLD)) $$(git rev-parse HEAD)
 
 coverage: setup-dev ## lines of the kernels that their tests run, with the compiler off
-	NUMBA_DISABLE_JIT=1 $(BIN)/python -m coverage run --source massspring/kernels -m pytest -q -m "not slow and not campaign" \
+	NUMBA_DISABLE_JIT=1 $(BIN)/python -m coverage run --source massspring/kernels -m pytest -q -m "not slow and not campaign and not lab" \
 		tests/massspring/kernels
 	$(BIN)/python -m coverage report --skip-covered --show-missing
 
