@@ -20,8 +20,6 @@ from studies.geometry.mesh.organ_mesh import OrganMesh
 from studies.scene.scene import Scene
 
 DESCRIPTION, README = "scene.json", "README.md"
-SOFA = Path(__file__).parent / "peers" / "sofa_scene.py"
-"""Adapter that is exported unchanged."""
 DIGITS = 12
 """Significant digits of exported numbers: 3.6 and not 3.5999999999999996."""
 
@@ -39,7 +37,6 @@ def export(scene: Scene, folder: Path, nodes: int, rows: Sequence[Sequence[str]]
     meshes, why_not = given_meshes(scene, nodes)
     data = rounded(description(scene, meshes, why_not))
     texts = {DESCRIPTION: json.dumps(data, indent=1) + "\n", README: readme(data, nodes, rows), NAME: SOLVER}
-    texts[SOFA.name] = SOFA.read_text(encoding="utf-8")
     if (folder / NAME).is_file() and (folder / NAME).read_text(encoding="utf-8", errors="replace") != SOLVER:
         del texts[NAME]
     written = [_write_mesh(mesh, folder) for mesh in meshes]

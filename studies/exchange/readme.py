@@ -19,7 +19,6 @@ more, each with a description; {version_words}.
 | paths.csv | displacement [m] of every obstacle and held region{lumen_column} over time [s] |
 | scene.json | material, loads, checkpoints, what is judged |
 | solve.py | a program to start from: reads the above, and hands in a body that does not move |
-| sofa_scene.py | the scene for SOFA with SofaPython3: `python sofa_scene.py` writes sofa.npz and sofa.json |
 
 Point data of the meshes is 1 or 0: {point_data}.
 

@@ -36,16 +36,3 @@ def read_points(path: Path) -> tuple[np.ndarray, dict[str, np.ndarray]]:
         raise StudyError(f"{path.name} cannot be read as a grid ({str(error).splitlines()[:1]})") from error
     points = np.asarray(grid.points, dtype=np.float64)
     return points, {name: np.asarray(values) for name, values in grid.point_data.items()}
-
-
-def read_cells(path: Path, kind: str) -> np.ndarray:
-    """The cells (k, m) of a type ("tetra", "tetra10") in a grid.
-
-    Raises StudyError if there is no file or it has no such cells, and any exception of meshio for a broken file.
-    """
-    if not path.is_file():
-        raise StudyError(f"there is no file {path}")
-    blocks = [block.data for block in meshio.read(path).cells if block.type == kind]
-    if not blocks:
-        raise StudyError(f"{path.name} holds no cells of type {kind}")
-    return np.concatenate(blocks).astype(np.int64)
