@@ -25,7 +25,7 @@ from studies.scene.library import JUDGED, SCENES
 from studies.scene.library.ball_clamped import BALL_CLAMPED
 from studies.scene.library.liver_probe import LIVER_PROBE
 from studies.scene.scene import Held, Organ
-from tests.geometry.boxes import box
+from tests.studies.geometry.boxes import box
 from tests.studies.tiny import SQUEEZE, tiny_case
 
 ORGANS = [scene for scene in JUDGED if scene.held]

@@ -10,7 +10,7 @@ import pytest
 from studies.bench import scan_references
 from studies.bench.scan_references import FINE, LIFTED, LOADS, PRESSED_IN, main, reference_of, refined, row, scan_scenes
 from studies.geometry import organ
-from tests.geometry.real import real_surface
+from tests.studies.geometry.real import real_surface
 
 LIVER, SPLEEN, STOMACH = "liver_hra_4999", "spleen_hra_4997", "stomach_bp3d_5015"
 WITHIN = (

@@ -19,7 +19,7 @@ from studies.reference.solve import element_size, solve
 from studies.scene.library.ball_clamped import BALL_CLAMPED, CAP, RADIUS
 from studies.scene.scene import Organ, ReferencePlan
 from studies.store.record import read_record
-from tests.geometry.boxes import box, split
+from tests.studies.geometry.boxes import box, split
 from tests.studies.tiny import write_obj
 
 LEVEL = 100

@@ -14,7 +14,7 @@ from studies.runs.prepare import attachments_for, body_for, prepare
 from studies.scene.library import Held
 from studies.scene.library.ball_clamped import BALL_CLAMPED
 from studies.scene.library.bladder_fill import BLADDER_FILL
-from tests.geometry.boxes import box, split
+from tests.studies.geometry.boxes import box, split
 from tests.studies.tiny import NODES, SQUEEZE, cube, file_scene, tiny_case, write_obj
 
 CLAMPED = replace(BALL_CLAMPED, reference=None)

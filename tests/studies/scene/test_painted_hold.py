@@ -13,8 +13,8 @@ from studies.meshing.scene_mesh import mesh_for, patch_nodes
 from studies.runs.case import BodyRecipe, Case, case_from_json
 from studies.scene.library.ball_clamped import BALL_CLAMPED, CAP, RADIUS
 from studies.scene.scene import Held, Organ
-from tests.geometry.boxes import box, split
-from tests.geometry.files import writers
+from tests.studies.geometry.boxes import box, split
+from tests.studies.geometry.files import writers
 
 LEVEL = 150
 

@@ -10,7 +10,7 @@ from studies.geometry.surface.distance import distance_to_surface
 from studies.scene.chosen_place import GAP, RADIUS, SIDES
 from studies.scene.proposal import HELD, proposal
 from studies.scene.tissues import tissue_named
-from tests.geometry.boxes import box, split, together
+from tests.studies.geometry.boxes import box, split, together
 
 
 def body_of(points, faces):

@@ -11,8 +11,8 @@ import pytest
 from studies.geometry.api import advice
 from studies.geometry.doctor.examine import examine
 from studies.geometry.files.units import Source
-from tests.geometry.boxes import box, split, together
-from tests.geometry.real import real_surface
+from tests.studies.geometry.boxes import box, split, together
+from tests.studies.geometry.real import real_surface
 
 EGG = split(*box((-1, -1, -1), (1, 1, 1)), times=3)
 POINTS = EGG[0] / np.linalg.norm(EGG[0], axis=1, keepdims=True) * (30, 25, 20)

@@ -17,8 +17,8 @@ from studies.geometry.mesh.organ_mesh import boundary_triangles, signed_volume
 from studies.geometry.organs.make_shape import make_shape
 from studies.geometry.surface.family import true_volume
 from studies.scene.scene import Organ
-from tests.geometry.boxes import box, split, together
-from tests.geometry.real import real_surface
+from tests.studies.geometry.boxes import box, split, together
+from tests.studies.geometry.real import real_surface
 
 EGG = split(*box((-1, -1, -1), (1, 1, 1)), times=2)
 POINTS = EGG[0] / np.linalg.norm(EGG[0], axis=1, keepdims=True) * (30, 25, 20)

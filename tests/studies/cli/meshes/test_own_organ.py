@@ -19,7 +19,7 @@ from studies.scene.scene_file import file_in_python
 from studies.scene.tissues import SPLEEN
 from studies.tools.advise.answer import advise
 from studies.tools.advise.campaign import shipped
-from tests.geometry.boxes import box, together
+from tests.studies.geometry.boxes import box, together
 from tests.studies.page.unpack import unpack_frames
 
 PAGE = Path(__file__).parents[4] / "docs" / "own-organ.md"

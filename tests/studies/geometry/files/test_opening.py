@@ -9,8 +9,8 @@ from studies.geometry.doctor.examine import examine
 from studies.geometry.files.opening import opened
 from studies.geometry.files.units import Source
 from studies.geometry.mesh.organ_mesh import signed_volume
-from tests.geometry.boxes import box, split
-from tests.geometry.files import writers
+from tests.studies.geometry.boxes import box, split
+from tests.studies.geometry.files import writers
 
 POINTS, FACES = split(*box((-1, -1, -1), (1, 1, 1)), times=2)
 POINTS = POINTS / np.linalg.norm(POINTS, axis=1, keepdims=True) * (30, 25, 20)

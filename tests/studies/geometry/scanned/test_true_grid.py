@@ -9,8 +9,8 @@ from studies.geometry.files.units import Source
 from studies.geometry.mesh.organ_mesh import signed_volume
 from studies.geometry.scanned.true_grid import target_volume, true_grid
 from studies.geometry.surface.family import enclosed_volume, true_volume
-from tests.geometry.boxes import box, split
-from tests.geometry.files import writers
+from tests.studies.geometry.boxes import box, split
+from tests.studies.geometry.files import writers
 
 AXES = np.array((0.030, 0.025, 0.020))
 

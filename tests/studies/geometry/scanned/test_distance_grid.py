@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from studies.geometry.scanned.distance_grid import BAND, distance_grid, winding_number
-from tests.geometry.boxes import box, box_distance, split, together
+from tests.studies.geometry.boxes import box, box_distance, split, together
 
 CELL = 0.1
 

@@ -8,7 +8,7 @@ from studies.base.errors import StudyError
 from studies.geometry import check_surface, scan
 from studies.geometry.doctor.examine import examine
 from studies.geometry.mesh.organ_mesh import signed_volume
-from tests.geometry.boxes import box, split, together
+from tests.studies.geometry.boxes import box, split, together
 
 MM = 1e-3
 AXES = np.array((30.0, 25.0, 20.0))

@@ -10,8 +10,8 @@ from studies.geometry.shape.regions import region_from_dict, region_to_dict
 from studies.geometry.surface.distance import distance_to_surface
 from studies.geometry.surface.painted import painted_region
 from tests.campaigns import campaign
-from tests.geometry.boxes import box, split
-from tests.geometry.files import writers
+from tests.studies.geometry.boxes import box, split
+from tests.studies.geometry.files import writers
 
 MM = 1e-3
 HILUM = "hilum"

@@ -14,7 +14,7 @@ from studies.geometry.surface.sides import (
     shape_functions,
     with_middles,
 )
-from tests.geometry.boxes import box, split
+from tests.studies.geometry.boxes import box, split
 
 BALL = Shape("ball", lambda x: np.linalg.norm(x, axis=1) - 1.0, (-1.6, -1.6, -1.6), (1.6, 1.6, 1.6), 0.05)
 

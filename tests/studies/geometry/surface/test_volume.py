@@ -11,8 +11,8 @@ from studies.geometry.shape.regions import BallRegion
 from studies.geometry.surface.family import true_volume
 from studies.geometry.surface.volume import depth, with_volume
 from tests.campaigns import campaign
-from tests.geometry.boxes import box, split
-from tests.geometry.files import writers
+from tests.studies.geometry.boxes import box, split
+from tests.studies.geometry.files import writers
 
 MM = 1e-3
 CAP = HalfSpace((0.020, 0.0, 0.0), (-1.0, 0.0, 0.0))

@@ -12,7 +12,7 @@ from studies.geometry import attach, check_tetrahedra, fill, read_mesh
 from studies.geometry.mesh.quality import dihedral_angles
 from studies.geometry.shape.regions import BallRegion
 
-REAL = Path(__file__).parents[3].parent / "shared" / "meshes"
+REAL = Path(__file__).parents[4].parent / "shared" / "meshes"
 
 
 def write(path, points, **cells):

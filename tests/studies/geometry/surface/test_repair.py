@@ -7,7 +7,7 @@ from studies.base.errors import StudyError
 from studies.geometry import check_surface
 from studies.geometry.mesh.organ_mesh import signed_volume
 from studies.geometry.surface.repair import border, mend, oriented, part_of, without_holes
-from tests.geometry.boxes import box, split, together
+from tests.studies.geometry.boxes import box, split, together
 
 
 def test_a_sound_surface_is_left_alone():

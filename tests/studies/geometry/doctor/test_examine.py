@@ -12,10 +12,10 @@ from massspring import Material, step_limit, tetrahedral_body
 from studies.base.errors import StudyError
 from studies.geometry.doctor.examine import examine
 from studies.geometry.doctor.findings import RULES
-from tests.geometry.boxes import box, split, together
-from tests.geometry.real import NAMES, real_surface
+from tests.studies.geometry.boxes import box, split, together
+from tests.studies.geometry.real import NAMES, real_surface
 
-DOCUMENT = Path(__file__).parents[3] / "docs" / "meshes.md"
+DOCUMENT = Path(__file__).parents[4] / "docs" / "meshes.md"
 EGG = split(*box((-1, -1, -1), (1, 1, 1)), times=2)
 POINTS = EGG[0] / np.linalg.norm(EGG[0], axis=1, keepdims=True) * (0.03, 0.025, 0.02)
 FACES = EGG[1]

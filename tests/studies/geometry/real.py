@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-FOLDER = Path(__file__).parents[2].parent / "shared" / "meshes"
+FOLDER = Path(__file__).parents[3].parent / "shared" / "meshes"
 COARSE = ("liver_hra_552", "spleen_hra_550", "stomach_bp3d_542")
 NAMES = (
     *COARSE,

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from studies.geometry.scanned.fidelity import NOTABLE, fidelity, warnings_of
-from tests.geometry.boxes import box, split, together
+from tests.studies.geometry.boxes import box, split, together
 
 BALL, FACES = split(*box((-1, -1, -1), (1, 1, 1)), times=4)
 BALL = 0.05 * BALL / np.linalg.norm(BALL, axis=1, keepdims=True)

@@ -14,7 +14,7 @@ from studies.geometry.surface.intersections import crossing_triangles
 from studies.geometry.surface.node_count import QUALITY
 from studies.geometry.surface.sides import outline_edges, region_side
 from studies.geometry.surface.snap import crossing_edges
-from tests.geometry.boxes import box, split
+from tests.studies.geometry.boxes import box, split
 
 TIP = np.array([0.3, 0.25, 0.92]) / np.linalg.norm([0.3, 0.25, 0.92])
 """Between the nodes of the coarse mesh."""

@@ -13,8 +13,8 @@ from studies.geometry.doctor.examine import examine
 from studies.geometry.files.opening import opened
 from studies.geometry.files.units import Source
 from studies.geometry.mesh.organ_mesh import signed_volume
-from tests.geometry.boxes import box, split
-from tests.geometry.files import writers
+from tests.studies.geometry.boxes import box, split
+from tests.studies.geometry.files import writers
 
 POINTS, FACES = split(*box((-0.03, -0.02, -0.01), (0.03, 0.02, 0.01)), times=1)
 PYTHON = re.compile(r"\w+Error\b|\w+Exception\b|SystemExit|Traceback|<class|object at 0x|NoneType|ndarray")

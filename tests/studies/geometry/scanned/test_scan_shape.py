@@ -7,7 +7,7 @@ from studies.base.errors import StudyError
 from studies.geometry.mesh.organ_mesh import signed_volume
 from studies.geometry.scanned.scan_shape import scan_shape, smoothed
 from studies.geometry.surface.first_surface import first_surface
-from tests.geometry.boxes import box, box_distance, split
+from tests.studies.geometry.boxes import box, box_distance, split
 
 MM = 1e-3
 CUT = (20.0, 30.0)

@@ -13,8 +13,8 @@ from studies.geometry import check_surface, check_tetrahedra, scan
 from studies.geometry.api.scans import raw_surface
 from studies.geometry.mesh.organ_mesh import signed_volume
 from studies.geometry.mesh.quality import dihedral_angles, tetrahedron_radius_ratio
-from tests.geometry.boxes import box, split, together
-from tests.geometry.real import NAMES, real_surface
+from tests.studies.geometry.boxes import box, split, together
+from tests.studies.geometry.real import NAMES, real_surface
 
 MM = 1e-3
 SPLEEN = "spleen_hra_550"
