@@ -44,6 +44,8 @@ def flat_facets(monkeypatch):
 def test_how_far_two_bodies_are_apart():
     between = apart(body_run(COARSE, force=1.02, shift=0.9), body_run(FINE))
     assert between == pytest.approx(Apart(2.0, 10.0), rel=1e-9)
+    at_the_end_alone = np.array([9.0, 9.0, 9.0, 1.02])
+    assert apart(body_run(COARSE, force=at_the_end_alone), body_run(FINE)).force == pytest.approx(2.0, rel=1e-9)
     assert apart(body_run(COARSE), body_run(FINE)) == pytest.approx(Apart(0.0, 0.0), abs=1e-9)
 
 

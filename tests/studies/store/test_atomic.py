@@ -80,13 +80,13 @@ def test_kill_9_leaves_a_whole_file(tmp_path):
     assert path.read_bytes() == b"next"
 
 
-def test_old_leftovers_are_swept_and_fresh_ones_kept(tmp_path):
-    for name in ("a.h5.1.part", "b.h5.2.part", "c.h5"):
+def test_old_leftovers_are_swept_and_those_of_living_writers_kept(tmp_path):
+    hours = {"a.h5.1.part": 2.0, "b.h5.2.part": 0.5, "c.h5.3.part": 0.0, "d.h5": 2.0}
+    for name, age in hours.items():
         (tmp_path / name).write_bytes(b"x")
-    for name in ("a.h5.1.part", "c.h5"):
-        os.utime(tmp_path / name, (time.time() - 7200,) * 2)
+        os.utime(tmp_path / name, (time.time() - 3600 * age,) * 2)
     assert sweep_parts(tmp_path) == 1
-    assert sorted(p.name for p in tmp_path.iterdir()) == ["b.h5.2.part", "c.h5"]
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["b.h5.2.part", "c.h5.3.part", "d.h5"]
 
 
 def test_no_two_writers_have_one_part_and_all_may_read_the_file(tmp_path):

@@ -1,13 +1,14 @@
 """Files that were cut off, changed or written by others: named, never read as results."""
 
 import h5py
+import numpy as np
 import pytest
 
 from studies.base.errors import DamagedFile, StudyError
 from studies.store import opening
 from studies.store.entry import DAMAGED, why_stale
 from studies.store.opening import sealed
-from studies.store.record import SCHEMA, peek, read_record, write_record
+from studies.store.record import SCHEMA, Field, peek, read_record, write_record
 from tests.studies import made_up_run
 from tests.studies.store.test_store import KEY, record
 
@@ -30,6 +31,17 @@ def test_a_cut_off_file_is_one_sentence_wherever_it_was_cut(tmp_path):
             read_record(path)
         assert "\n" not in str(problem.value)
         assert why_stale(path, KEY, "f" * 64) == DAMAGED
+
+
+def test_a_changed_byte_is_found_wherever_it_is_in_a_large_file(tmp_path):
+    path = tmp_path / "a.h5"
+    write_record(path, record(fields={"t": Field(np.ones(400_000), "s", "time of each frame")}))
+    whole = path.read_bytes()
+    assert len(whole) > 3 * opening.CHUNK and peek(path).name == record().name
+    for place in range(opening.CHUNK // 2, len(whole), opening.CHUNK):
+        path.write_bytes(whole[:place] + bytes([whole[place] ^ 1]) + whole[place + 1 :])
+        with pytest.raises(DamagedFile):
+            peek(path)
 
 
 def test_foreign_files_are_one_sentence(tmp_path):

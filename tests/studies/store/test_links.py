@@ -97,6 +97,14 @@ def test_names_that_clash_get_their_hash(tmp_path):
         assert file[f"ball-{hashes[1]}"].attrs["key"] == '{"a": 1}'
 
 
+def test_two_records_of_one_name_are_both_in_the_index(tmp_path):
+    for number in (1, 2):
+        store(tmp_path, "ball", f'{{"a": {number}}}')
+    link_study(Ledger(tmp_path), "volume_loss")
+    with h5py.File(index_path(tmp_path, "volume_loss")) as file:
+        assert {case.attrs["key"] for case in file.values()} == {'{"a": 1}', '{"a": 2}'}
+
+
 def test_an_unreadable_case_is_reported_and_left_out(tmp_path):
     store(tmp_path, "ball/free", '{"a": 1}')
     bad = store(tmp_path, "ball/implicit", '{"a": 2}')
