@@ -56,7 +56,5 @@ from .tools.advise.answer import Advice as Advice
 from .tools.advise.answer import Recommendation as Recommendation
 from .tools.advise.answer import advise as advise
 from .tools.advise.answer import recommended as recommended
-from .tools.calibrate.calibrate import calibrate as calibrate
-from .tools.calibrate.stored import calibrated as calibrated
 
 __version__: str

@@ -21,7 +21,7 @@ PACKAGES = ("massspring", "reference_fem", "studies")
 MENU = {
     "Tutorial": ("first-study",),
     "How-to": (
-        *("own-organ", "accuracy", "calibration", "submit", "paraview", "archive", "population", "cluster"),
+        *("own-organ", "accuracy", "submit", "paraview", "archive", "population", "cluster"),
         *("CONTRIBUTING", "troubleshooting"),
     ),
     "Theory": ("theory", "paper", "breaking", "limits"),

@@ -38,7 +38,8 @@ RESERVED = (
     "smoke",
     "verify",
 )
-"""Folders of the results that are no study's, and the word for the main studies."""
+"""Folders of the results that are no study's ("calibration" in folders of release 0.3), and the word for the main
+studies."""
 SMOKE_FRAMES = 20
 
 

@@ -4,17 +4,15 @@ import time
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, nullcontext
-from pathlib import Path
 from types import TracebackType
 
 from rich.console import Console
-from rich.filesize import decimal
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
 
 from studies.base.counting import amounts
 from studies.base.interrupts import stop_if_pressed
 from studies.store.entry import MISSING
-from studies.sweep.plan import Planned, expected, expected_bytes, free_bytes, kind_of
+from studies.sweep.plan import Planned, expected, kind_of
 
 QUIET_SECONDS = 10.0
 """Without a terminal (a log file), a line at most this often."""
@@ -118,8 +116,8 @@ def compiling(console: Console, doing: str) -> Iterator[Callable[[str], None]]:
         yield tell
 
 
-def dry_run(console: Console, study: str, planned: list[Planned], jobs: int, root: Path) -> None:
-    """Says what would run: how much of what, why, how long, and what it will store below `root`."""
+def dry_run(console: Console, study: str, planned: list[Planned], jobs: int) -> None:
+    """Says what would run: how much of what, why, and how long."""
 
     def say(text: str) -> None:
         console.print(text, markup=False, highlight=False)
@@ -134,7 +132,6 @@ def dry_run(console: Console, study: str, planned: list[Planned], jobs: int, roo
     for (kind, why), pieces in groups.items():
         say(f"  {amounts(Counter({kind: len(pieces)}))} ({why}): about {words(expected(pieces, 1))} of computing")
     say(f"  about {words(expected(planned, jobs))} with {jobs} processes, {basis(planned)}; compiling comes on top")
-    say(f"  {disk(planned, root)}")
 
 
 def basis(planned: list[Planned]) -> str:
@@ -146,16 +143,3 @@ def basis(planned: list[Planned]) -> str:
     }
     kinds = {source: Counter(piece.kind for piece in pieces) for source, pieces in sources.items() if pieces}
     return ", ".join(f"{source} {amounts(count)}" for source, count in kinds.items())
-
-
-def disk(planned: list[Planned], root: Path) -> str:
-    """The size of what pieces will store, and the free space of the disk."""
-    stored, unknown = expected_bytes(planned)
-    free = free_bytes(root)
-    more = f" (without {amounts(Counter({'reference': unknown}))} of unknown size)" if unknown else ""
-    if stored > free:
-        return (
-            f"about {decimal(stored)}{more}, more than the {decimal(free)} that are free: make room (`organbench "
-            "prune` lists what is not needed), or choose another disk with --results"
-        )
-    return f"about {decimal(stored)}{more} will be stored, {decimal(free)} are free"

@@ -53,17 +53,35 @@ Results = Annotated[
     typer.Option("--results", envvar="ORGANBENCH_RESULTS", callback=_results_folder, help="folder of the results"),
 ]
 PROGRAM = "FILE.py is a program: run only files you trust"
+
+
+def studies(incomplete: str) -> list[str]:
+    """Names that a shell completes."""
+    from studies.catalog import STUDIES  # with what each command loads anyway, but not the list of commands
+
+    return [study.name for study in STUDIES if study.name.startswith(incomplete)]
+
+
+def scenes(incomplete: str) -> list[str]:
+    """Names that a shell completes."""
+    from studies.scene.library import CUT, SCENES  # as above
+
+    return [scene.name for scene in (*SCENES, *CUT) if scene.name.startswith(incomplete)]
+
+
 StudyName = Annotated[
     str,
     typer.Argument(
-        help=f"a study (see `organbench list studies`), or a FILE.py that defines STUDY or SCENE ({PROGRAM})"
+        autocompletion=studies,
+        help=f"a study (see `organbench list studies`), or a FILE.py that defines STUDY or SCENE ({PROGRAM})",
     ),
 ]
 SceneName = Annotated[
     str,
     typer.Argument(
+        autocompletion=scenes,
         help="a scene (see `organbench list scenes`), or a FILE.py that defines SCENE or STUDY; FILE.py:NAME where it "
-        f"has several ({PROGRAM})"
+        f"has several ({PROGRAM})",
     ),
 ]
 SMOKE = "smoke"

@@ -12,7 +12,6 @@ from rich.console import Console
 
 from studies.base.compile_watch import watching
 from studies.base.processes import run_each
-from studies.cli import progress
 from studies.cli.progress import QUIET_SECONDS, TerminalProgress, compiling, words
 from studies.metrics.timing.cases import timing_file
 from studies.runs.current import case_path
@@ -88,19 +87,12 @@ def test_a_dry_run_says_it_all_and_runs_nothing(organbench, tiny_file, results, 
     assert "tiny: 3 cases, 3 timings would run" in out
     assert re.search(r"  3 cases \(missing\): about \d+ s of computing\n", out)
     assert re.search(r"about \d+ s with 2 processes, from the rate of another machine for 3 cases, 3 timings;", out)
-    assert re.search(r"  about [\d.]+ kB will be stored, [\d.]+ [GT]B are free\n", out)
     stale(results, tiny_case(timed=True))
     code, out, _ = organbench("run", tiny_file, "--dry-run", "--results", results)
     assert re.search(r"  1 case \(the code has changed since\): about \d+ s of computing\n", out)
     assert "with 2 processes, from earlier runs of 1 case; compiling comes on top" in out
     code, out, _ = organbench("run", tiny_file, "--dry-run", "--only", "failed", "--results", results)
     assert out.strip() == "tiny: nothing would run: all results are current"
-
-
-def test_a_disk_without_room_is_named_beforehand(organbench, tiny_file, tmp_path, monkeypatch):
-    monkeypatch.setattr(progress, "free_bytes", lambda folder: 1000)
-    code, out, _ = organbench("run", tiny_file, "--dry-run", "--results", tmp_path / "empty")
-    assert code == 0 and re.search(r"about [\d.]+ kB, more than the 1\.0 kB that are free: make room", out)
 
 
 def test_the_room_is_that_of_the_disk_on_which_the_folder_will_lie(tmp_path):

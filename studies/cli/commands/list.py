@@ -1,26 +1,29 @@
 """`organbench list`: what there is to name."""
 
-from collections.abc import Callable, Sequence
 from typing import Annotated
 
 import typer
 from rich.markup import escape
 from rich.table import Table
 
+from massspring import LITERATURE, METHODS
 from studies.base.lookup import lookup
-from studies.cli import outline
+from studies.catalog import STUDIES
+from studies.catalog.population import POPULATION
+from studies.catalog.population import study as population
 from studies.cli.terminal import console
 from studies.geometry.organs import SHAPES
+from studies.metrics.metrics import METRICS
 from studies.scene.library import CUT, SCENES
 
-KINDS: dict[str, Callable[[], Sequence[tuple[str, str]]]] = {
-    "studies": outline.studies,
-    "scenes": lambda: [(scene.name, scene.title) for scene in (*SCENES, *CUT)],
-    "organs": lambda: [(name, (make.__doc__ or "").strip().split("\n")[0]) for name, make in SHAPES.items()],
-    "methods": outline.methods,
-    "metrics": outline.metrics,
+KINDS = {
+    "studies": [*((study.name, study.question) for study in STUDIES), (POPULATION, population.__doc__)],
+    "scenes": [(scene.name, scene.title) for scene in (*SCENES, *CUT)],
+    "organs": [(name, make.__doc__) for name, make in SHAPES.items()],
+    "methods": [(method.name, method.__doc__) for method in (*METHODS, *LITERATURE)],
+    "metrics": [(metric.name, metric.of.__doc__) for metric in METRICS],
 }
-"""What can be listed: names, each with its line."""
+"""What can be listed: names, each with a text whose first paragraph is shown."""
 
 
 def list(kind: Annotated[str, typer.Argument(help=f"one of {', '.join(KINDS)}; default: all")] = "") -> None:
@@ -30,6 +33,6 @@ def list(kind: Annotated[str, typer.Argument(help=f"one of {', '.join(KINDS)}; d
     for title, rows in KINDS.items():
         if kind in ("", title):
             table = Table(title=None if kind else title, title_justify="left", show_header=False, box=None)
-            for row in rows():
-                table.add_row(*map(escape, row))
+            for name, text in rows:
+                table.add_row(escape(name), escape(" ".join((text or "").split("\n\n")[0].split())))
             console.print(table)

@@ -13,6 +13,7 @@ from studies.base.errors import StudyError
 from studies.base.lookup import lookup
 from studies.catalog import STUDIES, Study
 from studies.catalog.checks import check_study
+from studies.cli import terminal
 from studies.cli.options import case_named
 from studies.cli.progress import TerminalProgress, dry_run
 from studies.cli.terminal import PROGRAM, SMOKE, Results, Smoke, console, say, warn
@@ -45,7 +46,9 @@ Rule = Callable[[Ledger, Job], bool]
 
 
 def run(
-    studies: Annotated[list[str] | None, typer.Argument(metavar="STUDY", help=GIVEN)] = None,
+    studies: Annotated[
+        list[str] | None, typer.Argument(metavar="STUDY", help=GIVEN, autocompletion=terminal.studies)
+    ] = None,
     results: Results = Path("results"),
     smoke: Smoke = False,
     case: Annotated[str, typer.Option(help="only the case with this name or part of a name; draws no charts")] = "",
@@ -89,7 +92,7 @@ def run(
                 continue
             selection = _selection(ledger, study, rules)
             if dry:
-                dry_run(console, study.name, plan(ledger, study, selection), jobs or JOBS, root)
+                dry_run(console, study.name, plan(ledger, study, selection), jobs or JOBS)
             else:
                 well = _bring_up_to_date(ledger, study, executor, selection, not case, failures) and well
     if report and not dry:
@@ -189,7 +192,7 @@ def _time_again(ledger: Ledger, study: Study, dry: bool, drawn: bool) -> None:
         say(f"{study.name}: no stored case of this code can be timed; run `organbench run` first")
         return
     if dry:
-        dry_run(console, study.name, planned, 1, ledger.root)
+        dry_run(console, study.name, planned, 1)
         return
     with TerminalProgress(console, planned) as progress:
         count = measure_again(ledger, study, progress, progress.compiling)

@@ -101,10 +101,6 @@ def test_the_example_of_contributing_is_a_scene_for_other_programs(organbench, t
     user_code.forget()
 
 
-def test_calibrate_takes_no_file(refused, write):
-    assert "give an organ, such as liver" in refused("calibrate", write(SCENE))
-
-
 def test_lines_for_a_shell_name_the_file(write):
     study = find_study(write(STUDY))
     path = study.word

@@ -169,13 +169,6 @@ def test_sigterm_is_a_sentence_and_its_own_code(organbench, monkeypatch):
     assert err.strip() == SAID.replace("interrupted", "ended by SIGTERM")
 
 
-def test_the_entry_point_is_ready_before_anything_large_is_read():
-    """Ctrl-C after its first lines; what these need is part of the interpreter, or loaded before any program."""
-    program = "import studies.__main__, os, signal; os.kill(os.getpid(), signal.SIGINT)"
-    done = subprocess.run([sys.executable, "-c", program], cwd=REPOSITORY, capture_output=True, text=True, check=False)
-    assert (done.returncode, done.stderr) == (130, "organbench: interrupted before anything was begun\n")
-
-
 def test_without_it_all_stays_as_it_was(organbench, monkeypatch):
     monkeypatch.setattr(cli, "app", broken)
     before = signal.getsignal(signal.SIGINT)
