@@ -12,8 +12,8 @@ import pytest
 from massspring import METHODS
 from studies.base.errors import StudyError
 from studies.catalog.accuracy import ACCURACY
-from studies.geometry.organs.make_shape import make_shape
-from studies.geometry.surface.family import true_volume
+from studies.geometry.organs import make_shape
+from studies.geometry.surface.first_surface import true_volume
 from studies.reference.solve import VARIANTS
 from studies.report.publish import PUBLISHED
 from studies.report.sentences import APART, NODAL, SENTENCES, TOGETHER, random_organs, real_time

@@ -27,8 +27,8 @@ from studies.geometry.mesh.quality import (
     dihedral_angles,
     tetrahedron_radius_ratio,
 )
-from studies.geometry.organs.make_shape import make_shape
-from studies.geometry.surface.family import true_volume
+from studies.geometry.organs import make_shape
+from studies.geometry.surface.first_surface import true_volume
 from studies.store.stamps import set_stamp
 from studies.store.tables import write_table
 

@@ -19,7 +19,7 @@ from studies.geometry.files.estimate import size_warning
 from studies.geometry.files.faults import check_promises
 from studies.geometry.files.opening import opened
 from studies.geometry.files.units import UNITS, Source, check_unit, length_of, likely_units, unit_question
-from studies.geometry.mesher.progress import BEAT, WAITING
+from studies.geometry.mesher.process import STAGES
 
 Unit = Annotated[str | None, typer.Option(help="unit of the file's coordinates: m, cm, mm or in")]
 Scale = Annotated[float, typer.Option(help="factor on the file's coordinates")]
@@ -68,6 +68,10 @@ def with_unit(source: Source) -> Source:
     return replace(source, unit=str(answer))
 
 
+EVERY = 40.0
+"""Least time [s] between two lines about the stage of the mesher, where there is no terminal."""
+
+
 class Telling(logging.Handler):
     """Shows the stage of the mesher: next to the moving line of a terminal, elsewhere as a line now and then."""
 
@@ -80,7 +84,7 @@ class Telling(logging.Handler):
         """Called for each stage."""
         if self.status is not None:
             self.status.update(escape(f"{self.what} … {record.getMessage()}"))
-        elif time.monotonic() - self.last_report > 2 * BEAT:
+        elif time.monotonic() - self.last_report > EVERY:
             self.last_report = time.monotonic()
             errors.print(f"{self.what} … {record.getMessage()}", markup=False, highlight=False)
 
@@ -89,11 +93,11 @@ class Telling(logging.Handler):
 def working(what: str) -> Iterator[None]:
     """Shows the stage of a long task: a line that moves, or lines where there is no terminal."""
     with busy(escape(what)) as status:
-        handler, level = Telling(what, status), WAITING.level
-        WAITING.addHandler(handler)
-        WAITING.setLevel(logging.INFO)
+        handler, level = Telling(what, status), STAGES.level
+        STAGES.addHandler(handler)
+        STAGES.setLevel(logging.INFO)
         try:
             yield
         finally:
-            WAITING.removeHandler(handler)
-            WAITING.setLevel(level)
+            STAGES.removeHandler(handler)
+            STAGES.setLevel(level)

@@ -15,7 +15,7 @@ from studies.exchange.meshes import STRAIGHT, GivenMesh, given_meshes
 from studies.exchange.precut import given_scene
 from studies.exchange.readme import readme
 from studies.exchange.starter import NAME, SOLVER
-from studies.geometry.files.grids import write_grid_file
+from studies.geometry.files.writing import write_grid_file
 from studies.geometry.mesh.organ_mesh import OrganMesh
 from studies.scene.scene import Scene
 

@@ -14,7 +14,7 @@ import numpy as np
 import pandas as pd
 
 from studies.base.errors import StudyError
-from studies.geometry.files.grids import SUFFIX, read_points
+from studies.geometry.files.writing import SUFFIX, read_points
 
 DISPLACEMENT = "displacement"
 """Point data with displacements, for a grid whose points are those at rest."""

@@ -15,6 +15,7 @@ from .mesh.checks import check_tetrahedra as check_tetrahedra
 from .mesh.organ_mesh import OrganMesh as OrganMesh
 from .mesh.second_order import CurvedMesh as CurvedMesh
 from .organs import SHAPES as SHAPES
+from .organs import vary as vary
 from .organs.ball import project_ball as project_ball
 from .organs.bladder import BLADDER_REGIONS as BLADDER_REGIONS
 from .organs.kidney import KIDNEY_REGIONS as KIDNEY_REGIONS
@@ -25,7 +26,6 @@ from .organs.liver import LIVER_REGIONS as LIVER_REGIONS
 from .organs.liver import project_liver as project_liver
 from .organs.spleen import SPLEEN_REGIONS as SPLEEN_REGIONS
 from .organs.stomach import STOMACH_REGIONS as STOMACH_REGIONS
-from .organs.variation import vary as vary
 from .shape.regions import BallRegion as BallRegion
 from .shape.regions import EllipsoidRegion as EllipsoidRegion
 from .shape.regions import HalfSpace as HalfSpace

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from studies.geometry import CurvedMesh, OrganMesh, curved
-from studies.geometry.mesh.jacobian import PAIRS
+from studies.geometry.mesh.quality import PAIRS
 from studies.geometry.shape.levelset import Shape
 from studies.meshing.shaping import moved, upright_against
 

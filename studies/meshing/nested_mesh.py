@@ -10,8 +10,8 @@ from reference_fem import nodes
 from reference_fem.elements.evaluate import Evaluator
 from reference_fem.elements.shapes import basis_table, element_nodes
 from studies.base.errors import StudyError
-from studies.geometry.mesh.jacobian import smallest_jacobian
 from studies.geometry.mesh.organ_mesh import tetrahedron_volumes
+from studies.geometry.mesh.quality import smallest_jacobian
 from studies.meshing.bounds import HELD_AREA
 from studies.meshing.held_mesh import HeldMesh, held_mesh, rim_sides
 from studies.meshing.kept_shape import area_error, level_that_holds

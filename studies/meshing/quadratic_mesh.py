@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 
 from massspring.body.quadratic import CORNER_PARTS, MIDDLE_PARTS
-from studies.geometry.mesh.jacobian import curved_volume, jacobian_coefficients
 from studies.geometry.mesh.organ_mesh import tetrahedron_volumes
+from studies.geometry.mesh.quality import curved_volume, jacobian_coefficients
 
 TURNED = [0, 2, 1, 5, 4, 3]
 """A six-node facet seen from its other side."""

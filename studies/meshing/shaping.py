@@ -10,9 +10,8 @@ from reference_fem import facet_nodes, nodes
 from reference_fem.elements.shapes import edge_index
 from studies.base.errors import StudyError
 from studies.geometry import OrganMesh, curved
-from studies.geometry.mesh.jacobian import PAIRS
 from studies.geometry.mesh.organ_mesh import tetrahedron_volumes
-from studies.geometry.mesh.quality import tetrahedron_radius_ratio
+from studies.geometry.mesh.quality import PAIRS, tetrahedron_radius_ratio
 from studies.geometry.shape.levelset import Shape, at_depth, project
 from studies.meshing.held_mesh import HeldMesh, rim_sides
 from studies.meshing.outlines import drawn_middles

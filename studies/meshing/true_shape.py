@@ -9,7 +9,7 @@ from reference_fem import Evaluator, nodes
 from reference_fem.elements.shapes import edge_index
 from studies.base.lookup import lookup
 from studies.geometry import CurvedMesh, true_shape_of
-from studies.geometry.mesh.jacobian import PAIRS
+from studies.geometry.mesh.quality import PAIRS
 from studies.geometry.organs import SHAPES
 from studies.geometry.shape.levelset import Shape, at_depth, project
 from studies.meshing.held_mesh import HeldMesh, rim_sides

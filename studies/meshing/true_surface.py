@@ -132,8 +132,7 @@ def _fine(shape: Shape, scan: bool) -> tuple[tuple[np.ndarray, np.ndarray], floa
     which the finer of two triangulations halves."""
     # Imported here because scikit-image takes half a second.
     from studies.geometry.scanned.scan_shape import scan_surface
-    from studies.geometry.surface.family import quartered
-    from studies.geometry.surface.first_surface import first_surface
+    from studies.geometry.surface.first_surface import first_surface, quartered
 
     coarse = scan_surface(shape) if scan else first_surface(shape)
     fine = quartered(shape, *coarse)

@@ -13,8 +13,7 @@ from studies.base.errors import StudyError
 from studies.base.lookup import lookup
 from studies.geometry.api.scans import Remeshing, repaired_surface
 from studies.geometry.files.opening import opened
-from studies.geometry.organs import SHAPES
-from studies.geometry.organs.make_shape import make_shape
+from studies.geometry.organs import SHAPES, make_shape
 from studies.geometry.surface.first_surface import first_surface
 from studies.scene.clock import check_clock, is_number
 from studies.scene.cut_checks import check_cuts, check_cuttable

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from massspring import Capsule, Plane, Probe, Sphere
-from studies.geometry.organs.make_shape import make_shape
+from studies.geometry.organs import make_shape
 from studies.scene.inertia import top_speed
 from studies.scene.scene import Scene
 

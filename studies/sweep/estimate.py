@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from studies.base.errors import StudyError
-from studies.geometry.organs.make_shape import make_shape
+from studies.geometry.organs import make_shape
 from studies.reference.reference_solves import ReferenceSolve
 from studies.runs.case import Case
 from studies.scene.scene import Scene

@@ -13,7 +13,7 @@ from studies.cli.mesh_files import LongestSide, Part, Scale, Unit, Yes, ask_befo
 from studies.cli.terminal import console
 from studies.geometry.api.advice import NODES, with_command
 from studies.geometry.doctor.examine import TISSUE, Findings, examine
-from studies.geometry.files.parts import LISTED
+from studies.geometry.files.content import LISTED
 
 
 def mesh_check(

@@ -15,7 +15,7 @@ from studies.geometry.mesh.organ_mesh import OrganMesh, unique_edges
 from studies.geometry.mesh.quality import MIN_DIHEDRAL, dihedral_angles
 from studies.geometry.mesh.second_order import CurvedMesh, make_curved
 from studies.geometry.mesher.jobs import TIME_LIMIT, cached, mesh_from, patches_of
-from studies.geometry.organs.make_shape import make_shape
+from studies.geometry.organs import make_shape
 from studies.geometry.shape.levelset import Shape
 from studies.geometry.shape.regions import HalfSpace, Region, region_to_dict
 from studies.geometry.surface.node_count import FEWEST, MOST

@@ -9,9 +9,8 @@ import numpy as np
 
 from studies.geometry.doctor.findings import Finding, findings_of
 from studies.geometry.doctor.measures import describe_springs, describe_surface, describe_tetrahedra, describe_welding
-from studies.geometry.files.content import Content
+from studies.geometry.files.content import Content, Part, parts_in
 from studies.geometry.files.opening import opened
-from studies.geometry.files.parts import Part, parts_in
 from studies.geometry.files.reading import weld
 from studies.geometry.files.units import UNITS, Source, as_source, check_range, likely_units
 from studies.geometry.mesh.organ_mesh import OrganMesh, boundary_triangles

@@ -7,9 +7,8 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial import KDTree
 
-from studies.geometry.files.content import Content
+from studies.geometry.files.content import Content, coincident
 from studies.geometry.files.opening import opened
-from studies.geometry.files.parts import coincident
 from studies.geometry.files.units import LARGEST, SMALLEST, Source, as_source, check_range
 from studies.geometry.mesh.checks import check_finite, check_surface, check_tetrahedra
 from studies.geometry.mesh.organ_mesh import OrganMesh, signed_volume, surface_first, tetrahedron_volumes

@@ -1,4 +1,4 @@
-"""Writes a mesh to a file, whole or not at all."""
+"""Writes a mesh or any grid to a file, whole or not at all, and reads the nodes of a grid in the order of the file."""
 
 import contextlib
 import io
@@ -20,6 +20,9 @@ VOLUMES, SURFACES = (".vtu", ".vtk", ".msh"), (".stl", ".ply", ".obj", ".off")
 """Suffixes of formats with tetrahedra, and of those with triangles only."""
 TAGS = {"outer": 1, "lumen": 2, "tissue": 3}
 """Values of the cell data `part` (VTU, VTK) and of the physical groups (MSH)."""
+
+SUFFIX = ".vtu"
+"""Of grids for other programs."""
 
 
 def check_target(path: Path, source: Path | None = None) -> None:
@@ -117,3 +120,26 @@ def content(mesh: meshio.Mesh, suffix: str) -> bytes:
         path = Path(folder, "mesh" + suffix)
         meshio.write(path, mesh, **options)
         return path.read_bytes()
+
+
+def write_grid_file(path: Path, points: np.ndarray, cells: dict[str, np.ndarray], data: dict[str, np.ndarray]) -> None:
+    """Writes a grid to a file, whole or not at all. Raises StudyError if it cannot be written.
+
+    points: (n, 3) [m]; cells: type as meshio names it ("triangle", "tetra", "tetra10") -> nodes (k, m); data: name ->
+    point data.
+    """
+    blocks: list[Any] = [(kind, nodes.astype(np.int32)) for kind, nodes in cells.items()]
+    write_whole(path, content(meshio.Mesh(points, blocks, dict(data)), path.suffix.lower()))
+
+
+def read_points(path: Path) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+    """Points (n, 3) and point data of a grid, in the order of the file. Raises StudyError if it cannot be read."""
+    if not path.is_file():
+        raise StudyError(f"there is no file {path}")
+    try:
+        with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
+            grid = meshio.read(path)
+    except (Exception, SystemExit) as error:  # the readers of meshio may raise any exception
+        raise StudyError(f"{path.name} cannot be read as a grid ({str(error).splitlines()[:1]})") from error
+    points = np.asarray(grid.points, dtype=np.float64)
+    return points, {name: np.asarray(values) for name, values in grid.point_data.items()}

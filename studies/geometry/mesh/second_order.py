@@ -7,10 +7,10 @@ from scipy.sparse import coo_array, csr_array, diags_array
 from scipy.sparse.linalg import cg
 
 from studies.base.errors import StudyError
-from studies.geometry.mesh.jacobian import PAIRS, curved_volume, scaled_coefficients, smallest_jacobian
 from studies.geometry.mesh.organ_mesh import OrganMesh, tetrahedron_volumes, unique_edges
+from studies.geometry.mesh.quality import PAIRS, curved_volume, scaled_coefficients, smallest_jacobian
 from studies.geometry.mesh.smooth_nodes import trial_moves
-from studies.geometry.organs.make_shape import make_shape
+from studies.geometry.organs import make_shape
 from studies.geometry.shape.levelset import Shape, at_depth, project
 from studies.geometry.shape.regions import Region, region_from_dict
 

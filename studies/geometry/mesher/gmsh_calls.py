@@ -1,16 +1,26 @@
-"""General calls of gmsh, in the worker process only: gmsh may hang or crash, and is not thread-safe."""
+"""All that gmsh does for organs, but the sections of cuts (section.py): surfaces, fills, the octant of a ball. In the
+mesher's process only (process.py)."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import Any
 
 import gmsh
 import numpy as np
 
 from studies.base.errors import StudyError
-from studies.geometry.mesh.organ_mesh import boundary_triangles, same_triangles, tetrahedron_volumes
+from studies.geometry.mesh.organ_mesh import boundary_triangles, same_triangles, surface_first, tetrahedron_volumes
+from studies.geometry.mesh.quality import MIN_DIHEDRAL, MIN_RATIO, dihedral_angles, tetrahedron_radius_ratio
 from studies.geometry.shape.regions import Region
 
 TRIANGLE, TETRAHEDRON = 2, 4
+DELAUNAY, FRONTAL, HXT = 1, 4, 10
+MANY = 3000
+"""Surface nodes beyond which the fill is graded, that is, elements grow inwards; else most would lie deep inside."""
+FEW_ATTEMPTS = ((DELAUNAY, True, False), (FRONTAL, True, False), (HXT, False, False))
+MANY_ATTEMPTS = ((HXT, False, True), (DELAUNAY, False, True), (HXT, False, False))
+"""(algorithm, whether the Netgen optimiser runs, whether graded). Netgen doubles the worst angle, but takes seconds for
+many elements."""
 
 
 @contextmanager
@@ -134,3 +144,69 @@ def grow_inwards(surface: int, points: np.ndarray) -> None:
     gmsh.model.mesh.field.setNumber(field, "SizeMax", extent / 8.0)
     gmsh.model.mesh.field.setAsBackgroundMesh(field)
     gmsh.option.setNumber("Mesh.MeshSizeExtendFromBoundary", 0)
+
+
+def fill_surface(points: np.ndarray, triangles: np.ndarray, strict: bool = True) -> tuple[np.ndarray, np.ndarray]:
+    """Fills a closed surface: all points (n, 3) [m], those of the surface first, and tetrahedra (k, 4).
+
+    It tries several algorithms in a fixed order until the worst element is good enough, and takes the best fill. Raises
+    StudyError if all fail, and, if `strict`, for an element worse than MIN_DIHEDRAL or MIN_RATIO.
+    """
+    attempts, enough = (FEW_ATTEMPTS, 1.5) if len(points) <= MANY else (MANY_ATTEMPTS, 1.25)
+    best: tuple[float, np.ndarray, np.ndarray] | None = None
+    failures: list[str] = []
+    for algorithm, netgen, graded in attempts:
+        try:
+            all_points, tetrahedra = fill_once(points, triangles, algorithm, netgen, graded)
+        except StudyError as error:
+            failures.append(str(error))
+            continue
+        score = fill_score(all_points, tetrahedra)
+        if best is None or score > best[0]:
+            best = (score, all_points, tetrahedra)
+        if score >= enough:
+            break
+    if best is None:
+        raise StudyError(f"the surface of {len(points)} nodes could not be filled with tetrahedra: {failures[-1]}")
+    if strict and best[0] < 1.0:
+        raise StudyError(
+            f"the best fill of the surface of {len(points)} nodes has an element with a dihedral angle under "
+            f"{MIN_DIHEDRAL:g} degrees or a radius ratio under {MIN_RATIO:g}; "
+            "use more nodes where it is thin, or a smoother surface"
+        )
+    return best[1], best[2]
+
+
+def fill_score(points: np.ndarray, tetrahedra: np.ndarray) -> float:
+    """The smaller of worst dihedral angle and worst radius ratio, each over its limit [1]; 1 is just acceptable."""
+    angle = dihedral_angles(points, tetrahedra).min() / MIN_DIHEDRAL
+    ratio = tetrahedron_radius_ratio(points, tetrahedra).min() / MIN_RATIO
+    return float(min(angle, ratio))
+
+
+def build_octant(recipe: dict[str, Any], arrays: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Octant x, y, z >= 0 of the ball of `radius` [m]: the arrays of jobs.PARTS.
+
+    The element size grows from `h_pole` [m] at (0, 0, radius) to `h` [m] at a distance of one radius. Nodes of the
+    planes of symmetry have exactly coordinate 0, and nodes of the sphere the distance `radius` up to rounding.
+    """
+    radius, h, h_pole = recipe["radius"], recipe["h"], recipe["h_pole"]
+    with fresh_model(Mesh_Algorithm3D=1, Mesh_Optimize=1, Mesh_OptimizeNetgen=1, Mesh_MeshSizeExtendFromBoundary=0):
+        # Unit radius inside gmsh: its geometric tolerances are absolute.
+        gmsh.model.occ.addSphere(0, 0, 0, 1.0, angle1=0, angle2=np.pi / 2, angle3=np.pi / 2)
+        gmsh.model.occ.synchronize()
+        size = f"{h_pole / radius!r} + {(h - h_pole) / radius!r} * Min(1, Sqrt(x*x + y*y + (z - 1)*(z - 1)))"
+        field = gmsh.model.mesh.field.add("MathEval")
+        gmsh.model.mesh.field.setString(field, "F", size)
+        gmsh.model.mesh.field.setAsBackgroundMesh(field)
+        gmsh.model.mesh.generate(3)
+        _, points, tetrahedra = read_elements(TETRAHEDRON)
+    points[np.abs(points) < 1e-9] = 0.0
+    distance = np.linalg.norm(points, axis=1)
+    on_sphere = np.abs(distance - 1.0) < 1e-9
+    points[on_sphere] /= distance[on_sphere][:, None]
+    inverted = tetrahedron_volumes(points, tetrahedra) < 0
+    tetrahedra[inverted] = tetrahedra[inverted][:, [0, 2, 1, 3]]
+    points, triangles, tetrahedra, count = surface_first(radius * points, tetrahedra)
+    cells = {"triangles": triangles, "tetrahedra": tetrahedra}
+    return {"points": points, **cells, "surface_count": np.array(count), "outer_count": np.array(count)}

@@ -8,17 +8,15 @@ import numpy as np
 from studies.base.errors import StudyError
 from studies.geometry.mesh.checks import check_surface
 from studies.geometry.mesh.wall_layers import fill_wall
-from studies.geometry.mesher.fill import fill_surface
+from studies.geometry.mesher.gmsh_calls import build_octant, fill_surface
 from studies.geometry.mesher.jobs import cuts_of
-from studies.geometry.mesher.octant import build_octant
 from studies.geometry.mesher.organ_surface import close_surface, even_surface
-from studies.geometry.mesher.progress import stage
+from studies.geometry.mesher.process import Arrays, stage, work
 from studies.geometry.mesher.section import check_clear, cut_wall, fill_cut, plane_of, with_front
-from studies.geometry.mesher.worker import Arrays, work
-from studies.geometry.organs.make_shape import make_shape
+from studies.geometry.organs import make_shape
 from studies.geometry.shape.levelset import Shape, at_depth
 from studies.geometry.shape.regions import region_from_dict
-from studies.geometry.surface.family import enclosed_volume
+from studies.geometry.surface.first_surface import enclosed_volume
 from studies.geometry.surface.intersections import crossing_triangles
 from studies.geometry.surface.volume import with_volume
 

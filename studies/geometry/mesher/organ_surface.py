@@ -1,12 +1,12 @@
 """The surface of an organ with a given number of nodes: evenly spread, or where its shape needs them."""
 
+import mmgpy
 import numpy as np
 
 from studies.base.errors import StudyError
 from studies.geometry.mesh.organ_mesh import triangle_areas
 from studies.geometry.mesher.gmsh_calls import Remesher, fresh_model
-from studies.geometry.mesher.mmg_calls import EvenRemesher
-from studies.geometry.mesher.progress import stage
+from studies.geometry.mesher.process import stage
 from studies.geometry.shape.levelset import Shape
 from studies.geometry.shape.regions import ON_CURVE, Region
 from studies.geometry.surface.first_surface import first_surface
@@ -20,6 +20,31 @@ SPARES = (0.22, 0.1, 0.18, 0.26, 0.14)
 """Shares of spare nodes, tried in turn. They go where the surface of the even nodes is farthest from its shape."""
 MOST_SPARE = 120
 """Most spare nodes: the even nodes of a large mesh are near the shape already."""
+QUIET, NO_RIDGES = -1, 0
+"""Options of MMG: no angle between triangles is kept as a ridge, because the facets of a scan are arbitrary."""
+
+
+class EvenRemesher:
+    """A surface that is meshed with any number of sizes by MMG, which splits, collapses and flips edges.
+
+    MMG needs no map of the surface onto a plane, so it handles thin flaps and margins, on which the maps of gmsh fold
+    and its mesher hardly ends. C. Dapogny, C. Dobrzynski, P. Frey: Three-dimensional adaptive domain remeshing,
+    implicit domain meshing, and applications to free and moving boundary problems, J. Comput. Phys. 262, 2014.
+    """
+
+    def __init__(self, points: np.ndarray, triangles: np.ndarray, nearness: float):
+        """points (n, 3) [m], triangles (t, 3): a closed outward triangulation; nearness: largest distance of an edit
+        from it, over the edge length."""
+        self.nearness = nearness
+        self.points, self.triangles = np.ascontiguousarray(points), np.ascontiguousarray(triangles, dtype=np.int32)
+
+    def mesh(self, size: float) -> Surface:
+        """Points (n, 3) [m] near the surface and outward triangles (t, 3) with edges of about `size` [m]."""
+        mesh = mmgpy.MmgMeshS(self.points, self.triangles)
+        mesh.remesh(hsiz=size, hausd=self.nearness * size, angle=NO_RIDGES, verbose=QUIET)
+        triangles = np.asarray(mesh.get_triangles()).astype(np.int64)
+        used, renumbered = np.unique(triangles, return_inverse=True)
+        return np.asarray(mesh.get_vertices(), float)[used], renumbered.reshape(triangles.shape)
 
 
 def close_surface(shape: Shape, nodes: int, regions: list[Region], curved: bool) -> Surface:

@@ -9,20 +9,26 @@ import numpy as np
 
 from studies.base.errors import StudyError
 from studies.geometry.mesh.organ_mesh import signed_volume, triangle_areas
-from studies.geometry.mesher.mmg_calls import EvenRemesher
 from studies.geometry.mesher.organ_recipe import finish
-from studies.geometry.mesher.organ_surface import MOST_SPARE
-from studies.geometry.mesher.progress import stage
-from studies.geometry.mesher.worker import Arrays, work
+from studies.geometry.mesher.organ_surface import MOST_SPARE, EvenRemesher
+from studies.geometry.mesher.process import Arrays, stage, work
 from studies.geometry.scanned.distance_grid import box_of
 from studies.geometry.scanned.fidelity import NOTABLE, fidelity
 from studies.geometry.scanned.level_grid import grid_from, shape_of
-from studies.geometry.scanned.scan_shape import COARSEST, Surface, cell_for, faithful, levelled, scan_surface
-from studies.geometry.scanned.shells import solidified
-from studies.geometry.scanned.true_grid import target_volume, true_grid
+from studies.geometry.scanned.scan_shape import (
+    COARSEST,
+    Surface,
+    cell_for,
+    faithful,
+    levelled,
+    scan_surface,
+    solidified,
+    target_volume,
+    true_grid,
+)
 from studies.geometry.shape.levelset import Shape
 from studies.geometry.shape.regions import Region, region_from_dict
-from studies.geometry.surface.family import enclosed_volume
+from studies.geometry.surface.first_surface import enclosed_volume
 from studies.geometry.surface.fit import Fit, fitted
 from studies.geometry.surface.node_count import FEWEST, MOST, handles_of, surface_with
 from studies.geometry.surface.volume import with_volume

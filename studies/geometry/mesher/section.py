@@ -17,8 +17,7 @@ from studies.geometry.mesh.organ_mesh import (
     triangle_normals,
 )
 from studies.geometry.mesh.quality import MIN_WALL_RATIO, tetrahedron_radius_ratio
-from studies.geometry.mesher.fill import fill_surface
-from studies.geometry.mesher.gmsh_calls import TRIANGLE, fresh_model
+from studies.geometry.mesher.gmsh_calls import TRIANGLE, fill_surface, fresh_model
 from studies.geometry.shape.levelset import Shape, at_depth, project
 from studies.geometry.shape.regions import ON_CURVE, BallRegion, HalfSpace, Region, region_from_dict
 from studies.geometry.surface.first_surface import first_surface

@@ -1,17 +1,19 @@
-"""A scan as a level set, which is then meshed like a synthetic organ."""
+"""A scan as a level set, which is then meshed like a synthetic organ: its grid, smoothed or filled if asked, and the
+true shape, which is the same for all its meshes."""
 
 import numpy as np
-from scipy.ndimage import gaussian_filter
+from scipy.ndimage import distance_transform_edt, gaussian_filter, label
 from scipy.optimize import root_scalar
 from skimage.measure import marching_cubes
 
 from studies.base.errors import StudyError
 from studies.geometry.mesh.organ_mesh import signed_volume
-from studies.geometry.scanned.distance_grid import box_of, distance_grid
+from studies.geometry.scanned.distance_grid import box_of, distance_grid, squared_distance
+from studies.geometry.scanned.fidelity import NOTABLE
 from studies.geometry.scanned.level_grid import DistanceGrid, shape_of
 from studies.geometry.shape.levelset import Shape
 from studies.geometry.surface.distance import distance_to_surface
-from studies.geometry.surface.first_surface import first_surface
+from studies.geometry.surface.first_surface import enclosed_volume, first_surface
 from studies.geometry.surface.node_count import handles_of
 from studies.geometry.surface.repair import largest_part
 
@@ -21,12 +23,18 @@ at most 20 s of work."""
 CELLS_PER_EDGE = 2.5
 """Cells along an edge of the mesh, within these limits."""
 MISSED, FINER = 0.01, 1.6
-"""Distance over the diagonal beyond which the grid is refined, half of fidelity.NOTABLE; and the factor by which the
+"""Distance over the diagonal beyond which the grid is refined, half of NOTABLE; and the factor by which the
 cells then shrink."""
 ASKED = 5000
 """Most nodes of the file at which this distance is measured."""
 ROOM = 4
 """Cells between the surface and the walls of the grid, so that the steps of the mesher stay inside."""
+NEAR = 0.002
+"""Largest distance over the diagonal between surface and shape: a tenth of NOTABLE."""
+TIGHT = 1.0
+"""Smallest thickening of a wall in cells, which makes it tight on the grid."""
+BLUNT = 0.7
+"""Standard deviation of the Gaussian, in cells, that removes the steps of the cells."""
 
 Surface = tuple[np.ndarray, np.ndarray]
 
@@ -133,3 +141,55 @@ def iso_surface(grid: DistanceGrid, value: float, name: str) -> Surface:
     if signed_volume(points, triangles) < 0:
         triangles = triangles[:, ::-1].copy()
     return largest_part(points, triangles)
+
+
+def solidified(points: np.ndarray, triangles: np.ndarray, opening: float, name: str) -> Surface:
+    """Outer surface of what triangles (t, 3) on points (n, 3) [m] enclose; openings up to `opening` [m] are closed.
+
+    The triangles may be open, doubled or one-sided. They are thickened by half the opening or TIGHT cells. The region
+    that is then reachable from outside is the outside, and it grows back by the same amount. Raises StudyError if
+    nothing is enclosed.
+    """
+    used = points[np.unique(triangles)]
+    cell = FINEST * float(np.linalg.norm(np.ptp(used, axis=0)))
+    reach = max(0.5 * opening, TIGHT * cell)
+    margin = reach + ROOM * cell
+    low = used.min(axis=0) - margin
+    shape = np.ceil((used.max(axis=0) + margin - low) / cell).astype(int) + 1
+    away = cell * np.sqrt(squared_distance((points[triangles] - low) / cell, tuple(shape)))
+    regions = np.empty(away.shape, np.int32)
+    label(away > reach, output=regions)
+    inside = cell * np.asarray(distance_transform_edt(regions != regions[0, 0, 0])) > reach
+    # The border lies between the last cell of one side and the first of the other, hence half a cell.
+    steps = cell * (np.asarray(distance_transform_edt(inside)) + np.asarray(distance_transform_edt(~inside)) - 0.5)
+    values = np.where(inside, -1.0, 1.0) * np.minimum(away, steps)
+    if not inside.any() or not (away[inside] > 2 * cell).any():
+        raise StudyError(
+            f"{name}: the surface encloses nothing when openings up to {1e3 * opening:.3g} mm are closed; give a "
+            "larger --solid, or leave it out"
+        )
+    return iso_surface(DistanceGrid(low, cell, gaussian_filter(values, BLUNT)), 0.0, name)
+
+
+def true_grid(points: np.ndarray, triangles: np.ndarray, name: str) -> DistanceGrid:
+    """Signed distance to a closed outward surface of points (n, 3) [m] and triangles (t, 3), shifted by a constant.
+
+    The constant is far below a cell and gives the shape the volume of `target_volume`, to first order. Raises
+    StudyError if nothing of the shape is left on the grid.
+    """
+    cell = COARSEST * box_of(points, triangles)[0]
+    return with_volume_of((points, triangles), *faithful(points, triangles, cell, name, NEAR), name)
+
+
+def with_volume_of(surface: Surface, grid: DistanceGrid, start: Surface, name: str) -> DistanceGrid:
+    """The grid shifted by a constant that gives its shape the `target_volume`; start: a triangulation of the shape."""
+    volume = enclosed_volume(shape_of(grid, name), 1)
+    _, area = box_of(*start)
+    return DistanceGrid(grid.low, grid.cell, grid.values - (target_volume(surface, volume) - volume) / area)
+
+
+def target_volume(source: Surface, shape_volume: float) -> float:
+    """Volume [m^3] of the surface that a shape approximates, or `shape_volume` if the two differ by NOTABLE or more,
+    because parts of the surface overlap or are lost."""
+    volume = signed_volume(*source)
+    return volume if abs(shape_volume / volume - 1.0) < NOTABLE else shape_volume

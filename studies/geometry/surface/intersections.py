@@ -1,12 +1,22 @@
-"""Finds where a triangulation meets itself apart from shared nodes and edges. Decisions are exact (predicates.py)."""
+"""Finds where a triangulation meets itself apart from shared nodes and edges.
+
+Overlapping boxes are searched first. The decisions about their triangles are exact: floating point first, integers
+where its error bound does not suffice.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
-from studies.geometry.surface.boxes import overlapping_boxes
-from studies.geometry.surface.predicates import orientation, orientation_2
-
 CLEAR = 1e-9
 """Relative distance from a separating plane beyond which rounding does not matter; nearer, decisions are exact."""
+AT_ONCE = 1_000_000
+"""Pairs of boxes that are followed at the same time: some tens of megabytes."""
+BITS = 10
+BOUND_3, BOUND_2 = 7.8e-16, 3.4e-16
+"""Upper bounds of the rounding of the determinants in three and two dimensions, relative to the sum of the absolute
+values of the products (Shewchuk 1997, Adaptive precision floating-point arithmetic and fast robust geometric
+predicates, bounds A)."""
 
 
 def crossing_triangles(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
@@ -136,3 +146,117 @@ def unit(u: np.ndarray) -> np.ndarray:
 def normal(triangle: np.ndarray) -> np.ndarray:
     """Normals (n, 3) of triangles (n, 3, 3), of any length."""
     return np.cross(triangle[:, 1] - triangle[:, 0], triangle[:, 2] - triangle[:, 0])
+
+
+def overlapping_boxes(low: np.ndarray, high: np.ndarray) -> Iterator[np.ndarray]:
+    """Yields in portions the pairs (p, 2), lower index first, of boxes with corners low, high (n, 3) that touch.
+
+    The boxes are sorted along a Z-curve. Repeated halving of that order gives a tree of bounding boxes without
+    pointers, and pairs of tree nodes are followed downwards as long as their boxes touch.
+    """
+    if not len(low):
+        return
+    order = np.argsort(z_curve((low + high) / 2.0), kind="stable")
+    levels = tree(low[order], high[order])
+    waiting = [(0, np.zeros((1, 2), np.int64))]
+    while waiting:
+        depth, pairs = waiting.pop()
+        if depth == len(levels) - 1:
+            overlaps = order[pairs[pairs[:, 0] < pairs[:, 1]]]
+            if len(overlaps):
+                yield np.sort(overlaps, axis=1)
+            continue
+        pairs = touching(children(pairs), *levels[depth + 1])
+        waiting += [(depth + 1, pairs[first : first + AT_ONCE]) for first in range(0, len(pairs), AT_ONCE)]
+
+
+def children(pairs: np.ndarray) -> np.ndarray:
+    """Pairs of children of pairs of tree nodes (p, 2), each once: a pair of a node with itself has three."""
+    a, b = 2 * pairs.T
+    every = np.concatenate([np.stack([a + i, b + j], axis=1) for i in (0, 1) for j in (0, 1)])
+    return every[every[:, 0] <= every[:, 1]]
+
+
+def touching(pairs: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
+    """The pairs whose boxes have a point in common."""
+    a, b = pairs.T
+    keep = np.ones(len(pairs), bool)
+    for k in range(3):
+        keep &= (low[a, k] <= high[b, k]) & (low[b, k] <= high[a, k])
+    return pairs[keep]
+
+
+def tree(low: np.ndarray, high: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Low and high corners of the boxes of all levels, the root first; boxes that touch nothing fill the last level."""
+    size = 1 << max(0, int(np.ceil(np.log2(len(low)))))
+    empty = np.full((size - len(low), 3), np.inf)
+    levels = [(np.concatenate([low, empty]), np.concatenate([high, -empty]))]
+    while len(levels[0][0]) > 1:
+        low, high = levels[0]
+        levels.insert(0, (np.minimum(low[::2], low[1::2]), np.maximum(high[::2], high[1::2])))
+    return levels
+
+
+def z_curve(points: np.ndarray) -> np.ndarray:
+    """Positions (n,) of points (n, 3) on a Z-curve through their box: the interleaved bits of their coordinates."""
+    span = np.maximum(np.ptp(points, axis=0), 1e-300)
+    cells = ((points - points.min(axis=0)) / span * (2**BITS - 1)).astype(np.int64)
+    bits = [((cells[:, k] >> bit) & 1) << (3 * bit + k) for bit in range(BITS) for k in range(3)]
+    return np.sum(bits, axis=0)
+
+
+def orientation(a: np.ndarray, b: np.ndarray, c: np.ndarray, d: np.ndarray) -> np.ndarray:
+    """Sign of det(a - d, b - d, c - d), shape (n,) int, for points (n, 3): 1 if d lies below the plane of a, b, c,
+    which are anticlockwise seen from above, and 0 exactly in the plane."""
+    u, v, w = a - d, b - d, c - d
+    positive = [u[:, i] * v[:, j] * w[:, k] for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1))]
+    negative = [u[:, i] * v[:, j] * w[:, k] for i, j, k in ((2, 1, 0), (1, 0, 2), (0, 2, 1))]
+    value = np.asarray(sum(positive) - sum(negative))
+    return decided(value, BOUND_3, positive + negative, (a, b, c, d), exact_3)
+
+
+def orientation_2(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> np.ndarray:
+    """Sign of det(a - c, b - c), shape (n,) int, for points (n, 2): 1 if a, b, c are anticlockwise."""
+    u, v = a - c, b - c
+    products = [u[:, 0] * v[:, 1], u[:, 1] * v[:, 0]]
+    return decided(products[0] - products[1], BOUND_2, products, (a, b, c), exact_2)
+
+
+def decided(
+    value: np.ndarray,
+    bound: float,
+    products: Sequence[np.ndarray],
+    corners: Sequence[np.ndarray],
+    exact: Callable[..., np.ndarray],
+) -> np.ndarray:
+    """Signs of the determinants `value` (n,), decided by `exact` where twice the rounding error may exceed them."""
+    doubtful = np.abs(value) < 2.0 * bound * sum(np.abs(product) for product in products)
+    sign = np.sign(value).astype(int)
+    if doubtful.any():
+        sign[doubtful] = exact(*whole_numbers([corner[doubtful] for corner in corners]))
+    return sign
+
+
+def whole_numbers(arrays: list[np.ndarray]) -> list[np.ndarray]:
+    """The coordinates as Python integers, all multiplied by the same power of two."""
+    parts = [np.frexp(array) for array in arrays]
+    least = min(int(exponent.min()) for _, exponent in parts)
+    scaled = []
+    for mantissa, exponent in parts:
+        whole = (mantissa * 2.0**53).astype(np.int64).astype(object)
+        scaled.append(whole * np.array([1 << int(e) for e in (exponent - least).ravel()], object).reshape(whole.shape))
+    return scaled
+
+
+def exact_3(a: np.ndarray, b: np.ndarray, c: np.ndarray, d: np.ndarray) -> np.ndarray:
+    """Signs of det(a - d, b - d, c - d) for integer coordinates (n, 3)."""
+    (ux, uy, uz), (vx, vy, vz), (wx, wy, wz) = (a - d).T, (b - d).T, (c - d).T
+    value = ux * (vy * wz - vz * wy) + uy * (vz * wx - vx * wz) + uz * (vx * wy - vy * wx)
+    return (value > 0).astype(int) - (value < 0).astype(int)
+
+
+def exact_2(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> np.ndarray:
+    """Signs of det(a - c, b - c) for integer coordinates (n, 2)."""
+    (ux, uy), (vx, vy) = (a - c).T, (b - c).T
+    value = ux * vy - uy * vx
+    return (value > 0).astype(int) - (value < 0).astype(int)

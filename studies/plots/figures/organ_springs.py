@@ -14,7 +14,7 @@ from massspring import Body, Material, surface_body
 from massspring.body.springs import SpringKind
 from studies.base.counting import heading
 from studies.geometry import OrganMesh
-from studies.geometry.organs.make_shape import make_shape
+from studies.geometry.organs import make_shape
 from studies.plots.figures.organs import FRONT, draw_smooth, window
 from studies.plots.style.page import blank, finish, page, panels
 from studies.plots.style.render import vertex_normals

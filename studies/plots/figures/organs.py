@@ -12,7 +12,7 @@ from matplotlib.patches import Patch
 
 from studies.base.counting import heading, readable
 from studies.geometry import OrganMesh
-from studies.geometry.organs.make_shape import make_shape
+from studies.geometry.organs import make_shape
 from studies.geometry.shape.levelset import Shape
 from studies.geometry.shape.regions import region_from_dict
 from studies.geometry.surface.first_surface import first_surface

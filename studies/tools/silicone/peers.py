@@ -16,7 +16,7 @@ import typer
 from studies.base.errors import StudyError
 from studies.base.lookup import lookup
 from studies.exchange.peers.contest import PEERS, Attempt, Peer, hand_over
-from studies.geometry.files.grids import write_grid_file
+from studies.geometry.files.writing import write_grid_file
 from studies.plots.silicone import Point, draw
 from studies.scene.library import BALL_CLAMPED
 from studies.store.record import Status

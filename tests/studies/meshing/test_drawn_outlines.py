@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from studies.geometry.mesh.jacobian import PAIRS
+from studies.geometry.mesh.quality import PAIRS
 from studies.meshing import graded_mesh as grading
 from studies.meshing.graded_mesh import graded_mesh, mesh_at, middles
 from studies.scene.library.ball_clamped import BALL_CLAMPED

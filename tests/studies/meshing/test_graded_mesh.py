@@ -9,9 +9,9 @@ import pytest
 from massspring import Plane, Trajectory
 from studies.base.errors import StudyError
 from studies.geometry import HalfSpace, check_surface, curved
-from studies.geometry.mesh.jacobian import PAIRS
 from studies.geometry.mesh.organ_mesh import signed_volume, tetrahedron_volumes
-from studies.geometry.surface.family import true_volume
+from studies.geometry.mesh.quality import PAIRS
+from studies.geometry.surface.first_surface import true_volume
 from studies.meshing import graded_mesh as search
 from studies.meshing.graded_mesh import DRAWN, graded_mesh, halved, is_hollow, mesh_at, usual_grading
 from studies.meshing.scene_mesh import mesh_for

@@ -13,8 +13,8 @@ from reference_fem.system.saddle_point import System
 from studies.base.errors import StudyError
 from studies.catalog.population.draw import member
 from studies.geometry import HalfSpace
-from studies.geometry.mesh.jacobian import smallest_jacobian
 from studies.geometry.mesh.organ_mesh import tetrahedron_volumes
+from studies.geometry.mesh.quality import smallest_jacobian
 from studies.meshing.held_mesh import held_mesh, with_patches
 from studies.meshing.kept_shape import area_error
 from studies.meshing.nested_mesh import LEAST, LOST, SHARE, NestedMesh, at_nodes, base_mesh, marked, upright

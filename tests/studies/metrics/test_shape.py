@@ -7,8 +7,8 @@ import pytest
 
 from massspring import quadratic_body, surface_body, tetrahedral_body
 from studies.geometry import organ
-from studies.geometry.organs.make_shape import make_shape
-from studies.geometry.surface.family import true_volume
+from studies.geometry.organs import make_shape
+from studies.geometry.surface.first_surface import true_volume
 from studies.meshing.bounds import SHAPE, SHAPE_VOLUME
 from studies.meshing.rest_surface import LUMEN, OUTER, rest_surfaces
 from studies.meshing.true_surface import shape_errors, true_surface

@@ -13,7 +13,7 @@ from reference_fem.elements.shapes import build_elements, check_neighbours, elem
 from studies.base.errors import StudyError
 from studies.catalog.population import member
 from studies.geometry import curved
-from studies.geometry.mesh.jacobian import curved_volume
+from studies.geometry.mesh.quality import curved_volume
 from studies.meshing.held_mesh import held_mesh
 from studies.meshing.reference_mesh import on_true_sides, reference_mesh
 from studies.meshing.scene_mesh import mesh_for

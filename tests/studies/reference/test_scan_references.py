@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from reference_fem import facet_nodes, nodes
-from studies.geometry.mesh.jacobian import curved_volume
+from studies.geometry.mesh.quality import curved_volume
 from studies.geometry.shape.levelset import project
 from studies.meshing.graded_mesh import mesh_at
 from studies.meshing.reference_mesh import reference_mesh

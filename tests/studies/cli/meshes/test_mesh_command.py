@@ -12,10 +12,10 @@ from studies.base.errors import StudyError
 from studies.cli import mesh_files as commands
 from studies.cli.commands.mesh import Made, closeness
 from studies.geometry import organ, read_mesh, vary
-from studies.geometry.mesh.jacobian import curved_volume
 from studies.geometry.mesh.organ_mesh import boundary_triangles, signed_volume
-from studies.geometry.organs.make_shape import make_shape
-from studies.geometry.surface.family import true_volume
+from studies.geometry.mesh.quality import curved_volume
+from studies.geometry.organs import make_shape
+from studies.geometry.surface.first_surface import true_volume
 from studies.scene.scene import Organ
 from tests.studies.geometry.boxes import box, split, together
 from tests.studies.geometry.real import real_surface

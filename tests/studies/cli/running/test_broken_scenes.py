@@ -7,7 +7,7 @@ import pytest
 
 from massspring import Capsule, Plane, Sphere, Trajectory
 from studies.geometry import HalfSpace
-from studies.geometry.organs.make_shape import make_shape
+from studies.geometry.organs import make_shape
 from studies.scene.checks import check_scene, depth_at_start, surface_of
 from studies.scene.library import SCENES
 from studies.scene.library.stress import STRESS_SCENES

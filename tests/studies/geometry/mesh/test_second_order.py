@@ -10,12 +10,12 @@ from skfem.models.poisson import laplace
 from studies.base.errors import StudyError
 from studies.geometry import HalfSpace, ball, ball_octant, check_surface, curved, organ, organ_family
 from studies.geometry.api import organs as api
-from studies.geometry.mesh.jacobian import PAIRS, curved_volume, jacobian_coefficients, smallest_jacobian
 from studies.geometry.mesh.organ_mesh import unique_edges
+from studies.geometry.mesh.quality import PAIRS, curved_volume, jacobian_coefficients, smallest_jacobian
 from studies.geometry.mesh.second_order import GOOD, make_curved, middle_stiffness, true_outlines, unfold
 from studies.geometry.organs import SHAPES
 from studies.geometry.shape.levelset import Shape, at_depth
-from studies.geometry.surface.family import true_volume
+from studies.geometry.surface.first_surface import true_volume
 
 RADIUS = 0.05
 BALL_VOLUME = 4 / 3 * np.pi * RADIUS**3
@@ -100,7 +100,7 @@ def test_outlines_of_attachments_are_curves():
 def test_the_paper_s_meshes_have_its_counts(name, nodes, triangles):
     """Jung, Hong, Choi 2005: 544 nodes and 1,084 triangles for the liver, 550 and 1,096 for the stomach.
 
-    The count of the stomach's mesh with its wall is in tests/geometry/organs/test_organ_meshes.py.
+    The count of the stomach's mesh with its wall is in tests/studies/geometry/api/test_organs.py.
     """
     mesh = organ(name, nodes, fill=False)
     assert (mesh.outer_count, len(mesh.triangles)) == (nodes, triangles)

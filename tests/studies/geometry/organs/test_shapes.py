@@ -12,8 +12,7 @@ from skimage.measure import euler_number, label
 
 from studies.base.errors import StudyError
 from studies.geometry.mesh.organ_mesh import signed_volume, triangle_areas
-from studies.geometry.organs import SHAPES
-from studies.geometry.organs.variation import vary
+from studies.geometry.organs import SHAPES, vary
 from studies.geometry.shape.levelset import at_depth, gradient, normals
 from studies.geometry.surface.first_surface import first_surface
 

@@ -7,8 +7,8 @@ from studies.base.errors import StudyError
 from studies.geometry import curved, scan, true_shape_of
 from studies.geometry.files.units import Source
 from studies.geometry.mesh.organ_mesh import signed_volume
-from studies.geometry.scanned.true_grid import target_volume, true_grid
-from studies.geometry.surface.family import enclosed_volume, true_volume
+from studies.geometry.scanned.scan_shape import target_volume, true_grid
+from studies.geometry.surface.first_surface import enclosed_volume, true_volume
 from tests.studies.geometry.boxes import box, split
 from tests.studies.geometry.files import writers
 

@@ -6,9 +6,7 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from studies.geometry.surface.boxes import overlapping_boxes
-from studies.geometry.surface.intersections import crossing_triangles
-from studies.geometry.surface.predicates import orientation, orientation_2
+from studies.geometry.surface.intersections import crossing_triangles, orientation, orientation_2, overlapping_boxes
 from tests.studies.geometry.boxes import box, split, together
 
 ROT = np.linalg.qr(np.random.default_rng(5).normal(size=(3, 3)))[0]

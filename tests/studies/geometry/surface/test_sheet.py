@@ -5,7 +5,7 @@ import pytest
 
 from studies.base.errors import StudyError
 from studies.geometry import BallRegion, HalfSpace
-from studies.geometry.organs.make_shape import make_shape
+from studies.geometry.organs import make_shape
 from studies.geometry.surface.first_surface import first_surface
 from studies.geometry.surface.sheet import check_sheet, sheet_of
 from tests.massspring.conftest import icosphere

@@ -8,7 +8,7 @@ from studies.geometry import HalfSpace, check_surface, check_tetrahedra, organ, 
 from studies.geometry.mesh.organ_mesh import signed_volume
 from studies.geometry.organs import SHAPES
 from studies.geometry.shape.regions import BallRegion
-from studies.geometry.surface.family import true_volume
+from studies.geometry.surface.first_surface import true_volume
 from studies.geometry.surface.volume import depth, with_volume
 from tests.campaigns import campaign
 from tests.studies.geometry.boxes import box, split
