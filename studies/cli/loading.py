@@ -45,7 +45,6 @@ GROUPS = {
         "judge": "Judge the results of another program like our own.",
         "archive": "Pack records, tables, charts and code into a zip file.",
         "publish": "Copy tables and charts to results/published.",
-        "restamp": "Keep results after a change of code that moves no number.",
         "doctor": "Check this installation, its caches and its results.",
     },
 }
@@ -56,6 +55,7 @@ FORMER = {
     "check": "is now `organbench mesh-check`",
     "cost": "is now `organbench profile`",
     "prune": "is gone: delete the folder of a study, and `organbench run` computes it again",
+    "restamp": "is gone: `organbench run` computes what another code has made",
     "stress": "is now `organbench fuzz`",
 }
 """Commands of earlier versions, and what stands in their place."""

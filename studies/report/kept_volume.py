@@ -50,7 +50,7 @@ def kept_volumes(ledger: Ledger, studies: Sequence[Study]) -> pd.DataFrame:
 def _row(jobs: Mapping[str, CaseJob], file: str) -> dict[str, object] | None:
     """None for a file that turns out to be damaged: the table of its study reports it."""
     try:
-        record = read_record(jobs[file].path(), ("volume", "volume_target"))
+        record = read_record(jobs[file].path, ("volume", "volume_target"))
     except StudyError:
         return None
     case, worst = jobs[file].work, worst_volume(record.fields["volume"].values, record.fields["volume_target"].values)

@@ -15,7 +15,7 @@ OTHER_VERSION = "its file was written by another version, in another layout"
 CASE_CHANGED = "the case has changed since"
 CODE_CHANGED = "the code has changed since"
 HEAD = ("kind", "name", "status", "message", "fingerprint", "machine")
-ATTRIBUTES = ("seconds", "warnings", "unknowns", "steps_done", "scene", "portable")
+ATTRIBUTES = ("seconds", "warnings", "unknowns", "steps_done", "scene")
 """Of a record, what an entry holds."""
 
 
@@ -48,8 +48,6 @@ class Entry(NamedTuple):
     steps_done: int | None = None
     scene: str | None = None
     """Of a reference: the name of its scene."""
-    portable: str | None = None
-    """Settings of a result that is equal on every x86-64 processor; None for one that is not."""
 
     @property
     def state(self) -> tuple[int, ...]:

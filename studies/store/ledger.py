@@ -46,6 +46,7 @@ TIMED = (Status.OK, Status.INVERTED, Status.DRIFTED)
 class Result(Protocol):
     """The properties of a job by which the ledger finds its result."""
 
+    @property
     def path(self) -> Path:
         """The path of its record."""
         ...
@@ -89,7 +90,7 @@ class Ledger:
 
     def entry(self, job: Result) -> Entry | None:
         """The file of a job, whatever is in it; None where there is none."""
-        path = job.path()
+        path = job.path
         return self.files(path.parent.name).get(path.name)
 
     def why(self, job: Result) -> str | None:
@@ -98,7 +99,7 @@ class Ledger:
 
     def timing(self, job: Result, machine: str | None = None) -> Entry | None:
         """The file with the frame times of a case by a machine, this one by default."""
-        path = job.path()
+        path = job.path
         return self.files(path.parent.name).get(timing_name(path.name, machine or machine_id()))
 
     def can_be_timed(self, job: Result) -> bool:
@@ -112,7 +113,7 @@ class Ledger:
 
     def timed_somewhere(self, job: Result) -> bool:
         """Whether any machine has timed a case with this code, or none ever will, for it broke off."""
-        path = job.path()
+        path = job.path
         timings = [e for name, e in self.files(path.parent.name).items() if name.startswith(f"{path.stem}{TIMING}")]
         current = any(why_entry_is_stale(entry, job.digest, job.fingerprint) is None for entry in timings)
         return current or not self.can_be_timed(job)
@@ -144,7 +145,7 @@ class Ledger:
     def state(self, jobs: Iterable[Result]) -> str:
         """The files of jobs with sizes and times, as text: a copy of the folder has the same."""
         entries = ((job, self.entry(job)) for job in jobs)
-        return "\n".join(entry.written if entry else f"{job.path().name} -" for job, entry in entries)
+        return "\n".join(entry.written if entry else f"{job.path.name} -" for job, entry in entries)
 
     def forget(self, study: str, names: Iterable[str]) -> None:
         """Drops these files, which are damaged: the next use of the folder reads them again."""

@@ -5,7 +5,6 @@ from typing import Any, TypedDict, Unpack
 
 import numpy as np
 
-from studies.base import portable
 from studies.base.errors import StudyError
 from studies.store.machine import machine_id
 from studies.store.record import SCHEMA, Field, Record, Status
@@ -24,9 +23,8 @@ class Header(TypedDict):
 
 
 def new_record(*, attributes: Mapping[str, Any], fields: Mapping[str, Field], **header: Unpack[Header]) -> Record:
-    """A record with the current schema and this machine's id filled in, and whether it was computed portably."""
-    attributes = {**attributes, **portable.attributes()}
-    return Record(schema=SCHEMA, machine=machine_id(), attributes=attributes, fields=dict(fields), **header)
+    """A record with the current schema and this machine's id filled in."""
+    return Record(schema=SCHEMA, machine=machine_id(), attributes=dict(attributes), fields=dict(fields), **header)
 
 
 def new_fields(specs: Mapping[str, FieldSpec], values: Mapping[str, np.ndarray]) -> dict[str, Field]:

@@ -141,8 +141,6 @@ class RunAttributes(Timed):
     entry_seconds = optional_value(float, "s/s", "of an entry from outside: computing time for a simulated second")
     league = optional_value(str, "", "of an entry of the league: what its file says, as JSON")
     own_files = optional_value(str, "", "files of the user with the method and the law: JSON, path to SHA-256")
-    portable = optional_value(str, "", "settings of a result that is equal on every x86-64 processor")
-    restamped = optional_value(str, "", "former code, and replays by which the result was kept for this code")
 
 
 class ReferenceFields(Table):
@@ -188,8 +186,6 @@ class ReferenceAttributes(Table):
     stopped = value(str, "", "why refinement ended before the plan's tolerance; empty where it did not")
     set = optional_value(str, "", "the published set and file of references that it is of")
     seconds = value(float, "s", "wall time of all solutions")
-    portable = optional_value(str, "", "settings of a result that is equal on every x86-64 processor")
-    restamped = optional_value(str, "", "former code, and replays by which the result was kept for this code")
 
 
 class TimingFields(Table):
@@ -206,7 +202,6 @@ class TimingAttributes(Timed):
     core = optional_value(int, "1", "core that the process was pinned to; none where it cannot be")
     threads = value(int, "1", "threads that compiled code was allowed")
     repeats = value(int, "1", "repeats", "r")
-    restamped = optional_value(str, "", "former code, and replays by which the result was kept for this code")
 
 
 RUN_FIELDS, RUN_ATTRIBUTES = lines_of(RunFields, FieldSpec), lines_of(RunAttributes, AttributeSpec)

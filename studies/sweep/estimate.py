@@ -1,4 +1,4 @@
-"""Seconds, memory and bytes of what has never run, from its size, which is known before there is a mesh."""
+"""Seconds of what has never run, from its size, which is known before there is a mesh."""
 
 import math
 
@@ -9,7 +9,6 @@ from studies.geometry.organs import make_shape
 from studies.reference.reference_solves import ReferenceSolve
 from studies.runs.case import Case
 from studies.scene.scene import Scene
-from studies.store.schema import SURFACE
 
 SECONDS_PER_UNKNOWN = 2e-3
 """Of a load path, [s]: the median of 51 reference solutions of the catalogue with 10,832 to 89,683 unknowns, on two
@@ -37,25 +36,10 @@ BY_METHOD = {
     "element": 0.4,
 }
 """The same of methods that take longer than the body alone tells."""
-MEMORY = 0.3e9
-"""Memory of any process, with the libraries and a body [bytes]; 0.2e9 are measured."""
-PER_UNKNOWN, MEASURED = 17e3, 90_000
-"""Memory of a reference of up to so many unknowns [bytes for each]: 14.2e3 are measured for 25,423 (kidney_probe, MKL),
-and 13.3e3 for 89,598."""
-ORDER = 1 / 3
-"""Of the growth of that beyond: factors of a matrix over a volume of n points have n^(4/3) numbers (George 1973)."""
 MOST_PER_NODE = 6.5
 """Unknowns of a reference on a whole organ of n surface nodes, over n^1.5. No scene of the catalogue has more."""
 MESH, GRADED_MESH = 3.0, 10.0
 """Seconds for the mesh and the body of a case."""
-HEAD, NUMBER = 22_000, 8
-"""Bytes of a record's attributes, names, descriptions and of what HDF5 keeps besides the numbers; of a number."""
-NODES = {"surface": 1.0, "membrane": 1.0, "tetrahedral": 1.6, "quadratic": 3.0}
-"""Nodes of a body of each kind per node on its surface."""
-CELLS = {"surface": 0.0, "membrane": 0.0, "tetrahedral": 3.5, "quadratic": 4.2}
-"""Tetrahedra per node."""
-SERIES, STAGES, REPLAY = 10, 8, 62
-"""Numbers of a frame besides those of its volumes, obstacles and held regions; of its timing; moments of a replay."""
 MARGIN = 1.2
 """Box of an organ over the extent of its surface."""
 
@@ -118,36 +102,3 @@ def organ_size(scene: Scene) -> float:
     from studies.scene.checks import surface_of  # with the readers of meshes
 
     return MARGIN * float(np.linalg.norm(np.ptp(surface_of(scene.organ, scene.name)[0], axis=0)))
-
-
-def solve_memory(solve: ReferenceSolve, last_unknowns: int | None) -> float:
-    """Memory of a reference, rather too much [bytes]; last_unknowns: those of its last result, where there is one."""
-    plan = solve.scene.reference
-    margin = MARGIN if plan is not None and plan.nested else 2.0  # nested meshes stop at a number, others end at a size
-    return MEMORY + factor_memory(last_unknowns or margin * unknowns(solve))
-
-
-def factor_memory(unknowns: float) -> float:
-    """Of the factors of a matrix with so many unknowns, with what is kept with them."""
-    return PER_UNKNOWN * unknowns * max(1.0, unknowns / MEASURED) ** ORDER
-
-
-def case_bytes(case: Case) -> int:
-    """Of the record of a case: 0.8 to 1.8 times those of 82 runs of the catalogue; one that breaks early is less."""
-    scene, body, surface = case.scene, case.body, case.body.nodes
-    nodes, cells = NODES[body.kind] * surface, CELLS[body.kind] * NODES[body.kind] * surface
-    few = 1.0 + bool(scene.lumen)
-    volumes = {"nodal": nodes, "patches": nodes / 8, "regions": float(body.regions)}.get(body.volumes, few)
-    volumes = nodes / 6 if body.kind == "quadratic" else volumes  # one per vertex
-    extra = sum(name not in SURFACE for name in case.recorded)
-    frame = SERIES + extra + 3 * volumes + 4 * len(scene.obstacles) + 3 * len(scene.held)
-    shape = nodes * (4 + 3 * len(scene.checkpoints)) + 4 * cells + 6 * surface
-    replay = 3 * 4 * REPLAY * surface if "surface" in case.recorded else 0
-    return int(HEAD + NUMBER * ((case.frames or scene.frames) * frame + shape) + replay)
-
-
-def timing_bytes(case: Case) -> int:
-    """Of the frame times of a case."""
-    from studies.metrics.timing.cases import REPEATS
-
-    return HEAD // 3 + NUMBER * (case.frames or case.scene.frames) * (REPEATS + STAGES)

@@ -51,11 +51,6 @@ class Executor(Protocol):
         """Jobs that it does at a time, for estimates."""
         ...
 
-    @property
-    def portable(self) -> bool:
-        """Whether results are to be equal on every x86-64 processor (studies.base.portable)."""
-        ...
-
     def map(self, jobs: Sequence[Job], on_compile: CompileListener) -> Generator[tuple[Job, str | None]]:
         """Does the jobs and yields each as it ends: with None, or with the cause where its process died in all tries.
 

@@ -19,7 +19,7 @@ class Failures:
 
     def can_store(self, job: Job) -> bool:
         """Whether the file of a job can be written; notes a folder in its place as the cause of a failure."""
-        path = job.path()
+        path = job.path
         if path.is_dir():
             self.causes[job.label] = f"{path} is a folder where a file belongs: delete it"
         return not path.is_dir()

@@ -23,7 +23,7 @@ def measure_times(
     def pending() -> list[Case]:
         ledger.look_again()
         untimed = [job for job in timed_jobs(ledger, study) if ledger.why_untimed(job) is not None]
-        return [job.work for job in untimed if among is None or job.path().absolute() in among]
+        return [job.work for job in untimed if among is None or job.path.absolute() in among]
 
     return _measured(ledger.root, study, progress, on_compile, pending)
 

@@ -13,7 +13,7 @@ from numpy.linalg import LinAlgError
 from studies.base.atomic import is_there
 from studies.base.errors import StudyError
 from studies.catalog.study import Study
-from studies.reference.published import fingerprint_of, published, record_of
+from studies.reference.published import Entry, fingerprint_of, published, record_of
 from studies.reference.reference_solves import STUDY as REFERENCES
 from studies.reference.reference_solves import ReferenceSolve, reference_solves
 from studies.runs.case import Case
@@ -23,8 +23,8 @@ from studies.scene.scene import Scene
 from studies.store.entry import file_state, read_entry, why_entry_is_stale
 from studies.store.new_record import new_record
 from studies.store.paths import key_digest
-from studies.store.record import Record, Status, write_record
-from studies.sweep.estimate import MEMORY, case_bytes, case_seconds, solve_memory, solve_seconds, unknowns
+from studies.store.record import Status, write_record
+from studies.sweep.estimate import case_seconds, solve_seconds, unknowns
 
 REFERENCE = "reference "
 """Before the name of a reference solution in its label."""
@@ -38,7 +38,8 @@ class Job(ABC):
     """The results folder."""
     study: str
     """Name of the study, or of the folder of references."""
-    work: Case | ReferenceSolve
+    work: Any
+    """A Case or a ReferenceSolve: what it computes."""
     initial_state: tuple[int, ...] | None = field(default=None, compare=False)
     """State of its file when the sweep began; None where there was none."""
 
@@ -57,24 +58,15 @@ class Job(ABC):
 
     @property
     @abstractmethod
-    def needs(self) -> float:
-        """Memory that it may take, rather too much [bytes]."""
-
-    @property
-    @abstractmethod
     def seconds(self) -> float:
         """Estimated duration on the machine of results/published [s]."""
-
-    @property
-    @abstractmethod
-    def size(self) -> int | None:
-        """Estimated bytes of its record; None where that is unknown."""
 
     @property
     @abstractmethod
     def fingerprint(self) -> str:
         """Hash of the code that computes it."""
 
+    @property
     @abstractmethod
     def path(self) -> Path:
         """Where its record lies."""
@@ -84,32 +76,32 @@ class Job(ABC):
         """Computes it and stores the result; where the record lies. Raises StudyError when it cannot be stored."""
 
     @abstractmethod
-    def failure(self, cause: str) -> Record:
-        """The record of a job that could not be done."""
+    def failure(self) -> tuple[str, dict[str, Any]]:
+        """Kind and attributes of the record of a job that could not be done."""
 
     def store_failure(self, cause: str) -> Path:
         """Stores it as failed. Raises StudyError when it cannot be stored."""
-        write_record(self.path(), self.failure(cause))
-        return self.path()
+        kind, attributes = self.failure()
+        head = {"kind": kind, "key": self.work.key, "name": self.work.name, "fingerprint": self.fingerprint}
+        failed = new_record(**head, status=Status.FAILED, message=cause, attributes=attributes, fields={})
+        write_record(self.path, failed)
+        return self.path
 
     @cached_property
-    def _digest(self) -> str:
+    def digest(self) -> str:
+        """SHA-256 (hex) of what it computes."""
         return key_digest(self.work.key)
 
     @property
-    def digest(self) -> str:
-        """SHA-256 (hex) of what it computes."""
-        return self._digest
-
     def state(self) -> tuple[int, ...] | None:
-        """Size, times and inode of its file; None where there is none."""
-        return file_state(self.path().stat()) if is_there(self.path()) else None
+        """Size, times and inode of its file now; None where there is none."""
+        return file_state(self.path.stat()) if is_there(self.path) else None
 
     def done_meanwhile(self) -> bool:
         """Whether another command has stored its result since the sweep began."""
-        if self.state() in (None, self.initial_state):
+        if self.state in (None, self.initial_state):
             return False
-        return why_entry_is_stale(read_entry(self.path()), self.digest, self.fingerprint) is None
+        return why_entry_is_stale(read_entry(self.path), self.digest, self.fingerprint) is None
 
 
 @dataclass(frozen=True)
@@ -128,50 +120,40 @@ class CaseJob(Job):
         return self.work.body.nodes / self.work.dt_fraction
 
     @property
-    def needs(self) -> float:
-        return MEMORY
-
-    @property
     def seconds(self) -> float:
         return case_seconds(self.work)
-
-    @property
-    def size(self) -> int:
-        return case_bytes(self.work)
 
     @property
     def fingerprint(self) -> str:
         return case_fingerprint(self.work)
 
     @cached_property
-    def _path(self) -> Path:
-        return case_path(self.root, self.study, self.work)
-
     def path(self) -> Path:
-        return self._path
+        return case_path(self.root, self.study, self.work)
 
     def run(self) -> Path:
         from studies.runs.run import run_case  # with the solver, which takes most of a second to load
 
         return run_case(self.root, self.study, self.work)
 
-    def failure(self, cause: str) -> Record:
+    def failure(self) -> tuple[str, dict[str, Any]]:
         from studies.runs.run import OWN_FILES
 
         own = {str(file.path): file.sha256 for file in files_of(self.work.method, self.work.body.law)}
-        return _failed(self, "run", cause, {"warnings": ""} | ({OWN_FILES: json.dumps(own)} if own else {}))
+        return "run", {"warnings": ""} | ({OWN_FILES: json.dumps(own)} if own else {})
 
 
 @dataclass(frozen=True)
 class ReferenceJob(Job):
-    """The reference of a scene."""
+    """The reference of a scene. A published one is copied, not solved."""
 
     work: ReferenceSolve
     kind = "reference"
 
     @cached_property
-    def _published(self) -> bool:
-        return published(self.work.scene) is not None
+    def _published(self) -> Entry | None:
+        """Its entry among the published references."""
+        return published(self.work.scene)
 
     @property
     def label(self) -> str:
@@ -182,38 +164,22 @@ class ReferenceJob(Job):
         return 1e9 + (0.0 if self._published else unknowns(self.work))
 
     @property
-    def needs(self) -> float:
-        if self._published:
-            return MEMORY
-        last_unknowns = read_entry(self.path()).unknowns if is_there(self.path()) else None
-        return solve_memory(self.work, last_unknowns)
-
-    @property
     def seconds(self) -> float:
         return 0.0 if self._published else solve_seconds(self.work)
-
-    @property
-    def size(self) -> None:
-        return None
 
     @property
     def fingerprint(self) -> str:
         return fingerprint_of(self.work.scene)
 
     @cached_property
-    def _path(self) -> Path:
+    def path(self) -> Path:
         return self.work.path(self.root)
 
-    def path(self) -> Path:
-        return self._path
-
     def run(self) -> Path:
-        """A published reference is copied, not solved. A mesh that cannot be made is stored as a failure: it
-        costs its scene, not the sweep."""
-        entry = published(self.work.scene)
-        if entry is not None:
-            write_record(self.path(), record_of(self.work.scene, entry))
-            return self.path()
+        """A mesh that cannot be made is stored as a failure: it costs its scene, not the sweep."""
+        if self._published is not None:
+            write_record(self.path, record_of(self.work.scene, self._published))
+            return self.path
         from studies.reference.solve import solve
 
         try:
@@ -223,29 +189,14 @@ class ReferenceJob(Job):
         except LinAlgError as error:  # of a small dense system: NumPy's word for a tangent without an inverse
             return self.store_failure(f"the equations of the reference cannot be solved: {error}")
 
-    def failure(self, cause: str) -> Record:
-        work = self.work
+    def failure(self) -> tuple[str, dict[str, Any]]:
         nothing = {"unknowns": 0, "steps_done": 0, "seconds": float("nan"), "off_shape": 0, "stopped": ""}
-        about = {"scene": work.scene.name}
-        return _failed(self, "reference", cause, about | nothing)
-
-
-def _failed(job: Job, kind: str, cause: str, attributes: dict[str, Any]) -> Record:
-    return new_record(
-        kind=kind,
-        key=job.work.key,
-        name=job.work.name,
-        status=Status.FAILED,
-        message=cause,
-        fingerprint=job.fingerprint,
-        attributes=attributes,
-        fields={},
-    )
+        return "reference", {"scene": self.work.scene.name, **nothing}
 
 
 def do(job: Job) -> Path:
     """Does a job, unless another command has meanwhile; where its record lies."""
-    return job.path() if job.done_meanwhile() else job.run()
+    return job.path if job.done_meanwhile() else job.run()
 
 
 def case_jobs(root: Path, study: Study) -> list[CaseJob]:
@@ -265,6 +216,6 @@ def jobs_of(root: Path, studies: Iterable[Study]) -> list[Job]:
     for study in sorted(studies, key=lambda study: study.scene_by_scene):
         turn = {scene.name: 1 + at if study.scene_by_scene else 0 for at, scene in enumerate(study.scenes)}
         for job in (*reference_jobs(root, study.scenes), *case_jobs(root, study)):
-            jobs.setdefault(job.path(), job)
-            turns.setdefault(job.path(), turn[job.work.scene.name])
-    return sorted(jobs.values(), key=lambda job: (turns[job.path()], -job.weight))
+            jobs.setdefault(job.path, job)
+            turns.setdefault(job.path, turn[job.work.scene.name])
+    return sorted(jobs.values(), key=lambda job: (turns[job.path], -job.weight))

@@ -73,7 +73,7 @@ def load_run(references: References, job: CaseJob) -> tuple[Run | None, list[Stu
             raise not_stored(ledger.root, job)
         if entry.fault:
             raise entry.error()
-        run = Run(job.work, read_record(job.path()), references.of(job.work.scene))
+        run = Run(job.work, read_record(job.path), references.of(job.work.scene))
     except StudyError as problem:
         return None, [problem]
     try:
@@ -98,7 +98,7 @@ def frame_times(ledger: Ledger, job: CaseJob) -> FrameTiming | None:
     why = why_entry_is_stale(entry, job.digest, job.fingerprint)
     if entry is None or (why is not None and not (why == CODE_CHANGED and is_archive(ledger.root))):
         return None
-    return timing_of(read_record(job.path().with_name(entry.file)))
+    return timing_of(read_record(job.path.with_name(entry.file)))
 
 
 def reference_problems(references: References, study: Study) -> list[StudyError]:

@@ -9,7 +9,6 @@ from pathlib import Path
 from numba.core import event
 
 from studies.base.compile_watch import EVENT, CompileWatch
-from studies.base.portable import environment as portable_environment
 from studies.base.processes import Tell, run_each
 from studies.catalog.study import Study
 from studies.geometry.mesher.jobs import cache_folder
@@ -36,13 +35,12 @@ def files_for(jobs: Sequence[Job]) -> tuple[Given, ...]:
     return given_files(job.work for job in jobs if isinstance(job, CaseJob))
 
 
-def environment(portable: bool = False) -> dict[str, str]:
-    """Variables of processes that do jobs: one thread, the caches of this process wherever they work; portable: the
-    settings of studies.base.portable."""
+def environment() -> dict[str, str]:
+    """Variables of processes that do jobs: one thread, the caches of this process wherever they work."""
     variables = {**dict.fromkeys(ONE_THREAD, "1"), "ORGANBENCH_CACHE": str(cache_folder().absolute())}
     if os.environ.get(COMPILED):
         variables[COMPILED] = str(Path(os.environ[COMPILED]).absolute())
-    return variables | (portable_environment() if portable else {})
+    return variables
 
 
 @dataclass(frozen=True)
@@ -50,7 +48,6 @@ class Local:
     """The executor that is this machine (studies.sweep.executor.Executor)."""
 
     processes: int
-    portable: bool = False
 
     def __enter__(self) -> "Local":
         return self
@@ -61,7 +58,7 @@ class Local:
     def map(self, jobs: Sequence[Job], on_compile: CompileListener) -> Generator[tuple[Job, str | None]]:
         """As every executor."""
         prepare = partial(begin, files_for(jobs))
-        for ended in run_each(jobs, self.processes, do, prepare, environment(self.portable), on_compile):
+        for ended in run_each(jobs, self.processes, do, prepare, environment(), on_compile):
             yield ended.job, ended.cause
 
     def measure(

@@ -1,17 +1,14 @@
-"""The jobs that a sweep would run: why, how long by the seconds of stored results, and how large."""
+"""The jobs that a sweep would run: why, and how long by the seconds of stored results."""
 
-import shutil
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
-from studies.base.errors import StudyError
 from studies.catalog.study import Study
 from studies.reference.reference_solves import STUDY as REFERENCES
 from studies.store.entry import Entry
 from studies.store.ledger import Ledger
 from studies.store.machine import machine_id
-from studies.sweep.estimate import SECONDS_PER_UNKNOWN, timing_bytes, timing_seconds
+from studies.sweep.estimate import SECONDS_PER_UNKNOWN, timing_seconds
 from studies.sweep.frame_times import timed_again
 from studies.sweep.job import REFERENCE, CaseJob, Job, case_jobs, jobs_of
 
@@ -35,8 +32,6 @@ class Planned:
     why: str
     seconds: float | None
     """Duration of its last run [s], without compiling; None where nothing is stored."""
-    size: int | None = None
-    """Bytes that it will store: as then, else from what a case records; None of a reference that is not stored."""
     guess: float = 0.0
     """Seconds by its size and a rate (studies.sweep.estimate), which count where it has not run."""
     here: bool = False
@@ -88,21 +83,20 @@ def rates(ledger: Ledger, jobs: Sequence[Job]) -> dict[str, float]:
 
 
 def _of_job(ledger: Ledger, job: Job, measured: Mapping[str, float]) -> Planned:
-    why = ledger.why(job) or "its result failed"
-    seconds, size = _cost(ledger.entry(job))
+    why, seconds = ledger.why(job) or "its result failed", _seconds(ledger.entry(job))
     guess = 0.0 if seconds is not None else job.seconds * measured.get(job.kind, 1.0)
-    return Planned(PHYSICS, job.kind, job.label, why, seconds, size or job.size, guess, job.kind in measured)
+    return Planned(PHYSICS, job.kind, job.label, why, seconds, guess, job.kind in measured)
 
 
 def _of_timing(ledger: Ledger, job: CaseJob, why: str, measured: Mapping[str, float]) -> Planned:
-    seconds, size = _cost(ledger.timing(job))
+    seconds = _seconds(ledger.timing(job))
     guess = 0.0 if seconds is not None else timing_seconds(job.work) * measured.get("case", 1.0)
-    return Planned(TIMING, TIMING, job.label, why, seconds, size or timing_bytes(job.work), guess, "case" in measured)
+    return Planned(TIMING, TIMING, job.label, why, seconds, guess, "case" in measured)
 
 
-def _cost(entry: Entry | None) -> tuple[float | None, int | None]:
-    """Seconds and bytes of a file; nothing of one that cannot be read."""
-    return (None, None) if entry is None or entry.fault else (entry.seconds, entry.size)
+def _seconds(entry: Entry | None) -> float | None:
+    """That a stored file says; None of one that cannot be read."""
+    return None if entry is None or entry.fault else entry.seconds
 
 
 def expected(pieces: Sequence[Planned], jobs: int) -> float:
@@ -112,23 +106,3 @@ def expected(pieces: Sequence[Planned], jobs: int) -> float:
     for piece in pieces:
         seconds[piece.stage].append(piece.guess if piece.seconds is None else piece.seconds)
     return max(sum(seconds[PHYSICS]) / jobs, *seconds[PHYSICS]) + sum(seconds[TIMING])
-
-
-def expected_bytes(pieces: Sequence[Planned]) -> tuple[int, int]:
-    """The size of what `pieces` will store, and how many of them are not counted, because their size is unknown. A
-    reference counts as the mean of those of known size."""
-    sizes = [piece.size for piece in pieces if piece.size is not None]
-    references = [piece.size for piece in pieces if piece.kind == "reference" and piece.size is not None]
-    unknown = len(pieces) - len(sizes)
-    if references:
-        return sum(sizes) + unknown * sum(references) // len(references), 0
-    return sum(sizes), unknown
-
-
-def free_bytes(folder: Path) -> int:
-    """Of the disk on which a folder lies, or will lie. Raises StudyError where that cannot be determined."""
-    there = next(place for place in (folder.absolute(), *folder.absolute().parents) if place.exists())
-    try:
-        return shutil.disk_usage(there).free
-    except OSError as problem:
-        raise StudyError(f"{there} does not report its free space ({problem.strerror})") from problem

@@ -36,11 +36,7 @@ def run_studies(
     root = root.absolute()
     executor, ledger = Local(jobs) if isinstance(jobs, int) else jobs, ledger or Ledger(root)
 
-    def stale(job: Job) -> bool:
-        entry = ledger.entry(job)
-        return ledger.why(job) is not None or (executor.portable and (entry is None or entry.portable is None))
-
-    rule = selection or stale
+    rule = selection or (lambda job: ledger.why(job) is not None)
     ledger.look_again()
     stored = [(job, ledger.entry(job)) for job in jobs_of(root, studies) if rule(job)]
     todo = [replace(job, initial_state=entry and entry.state) for job, entry in stored]
@@ -49,7 +45,7 @@ def run_studies(
         check_writable(root)
         storable = [job for job in todo if failures.can_store(job)]
         perform(executor, storable, progress, on_compile, failures.add)
-    among = None if selection is None else {job.path() for job in todo}
+    among = None if selection is None else {job.path for job in todo}
     measured = sum(executor.measure(ledger, study, progress, on_compile, among) for study in studies)
     ledger.look_again()
     return len(todo) + measured

@@ -13,8 +13,6 @@ from studies.sweep.job import Job, case_jobs, jobs_of
 
 CAUSES = 8
 """Of failures that are named one by one."""
-ANY = "any"
-"""Stands for the machine of a portable result, which is equal on every one (studies.base.portable)."""
 
 
 @dataclass(frozen=True)
@@ -95,15 +93,12 @@ def causes(job_standings: Sequence[Standing]) -> list[str]:
 def machines_of(job_standings: Iterable[Standing]) -> Counter[str]:
     """Results of each kind of machine, by its id, the most first; stale and missing ones left out."""
     ended = (standing.entry for standing in job_standings if standing.ended and standing.entry is not None)
-    counts = Counter(entry.machine if entry.portable is None else ANY for entry in ended)
-    return Counter(dict(counts.most_common()))
+    return Counter(dict(Counter(entry.machine for entry in ended).most_common()))
 
 
 def mixture(counts: Counter[str]) -> str | None:
     """A sentence for results that differ by rounding; None where all are of one kind."""
     if len(counts) < 2:
         return None
-    parts = [
-        f"{count} {'portable' if machine == ANY else f'of machine {machine}'}" for machine, count in counts.items()
-    ]
+    parts = [f"{count} of machine {machine}" for machine, count in counts.items()]
     return f"made on {len(counts)} kinds of processors, whose results differ by rounding: {', '.join(parts)}"

@@ -2,7 +2,6 @@
 
 import io
 import re
-import shutil
 from dataclasses import replace
 from functools import partial
 
@@ -19,7 +18,7 @@ from studies.store.entry import CODE_CHANGED, MISSING
 from studies.store.ledger import Ledger
 from studies.store.record import peek, read_record, write_record
 from studies.sweep.local import begin
-from studies.sweep.plan import PHYSICS, TIMING, Planned, expected, expected_bytes, free_bytes, plan
+from studies.sweep.plan import PHYSICS, TIMING, Planned, expected, plan
 from studies.sweep.run_studies import run_studies
 from studies.sweep.standings import failed
 from tests.studies.tiny import Silent, diverging_case, tiny_case, tiny_study
@@ -93,26 +92,6 @@ def test_a_dry_run_says_it_all_and_runs_nothing(organbench, tiny_file, results, 
     assert "with 2 processes, from earlier runs of 1 case; compiling comes on top" in out
     code, out, _ = organbench("run", tiny_file, "--dry-run", "--only", "failed", "--results", results)
     assert out.strip() == "tiny: nothing would run: all results are current"
-
-
-def test_the_room_is_that_of_the_disk_on_which_the_folder_will_lie(tmp_path):
-    assert free_bytes(tmp_path / "not" / "yet") == pytest.approx(shutil.disk_usage(tmp_path).free, rel=0.05)
-
-
-def test_bytes_are_those_of_the_last_time_or_of_what_is_recorded(results):
-    path = stale(results, tiny_case(timed=True))
-    (stored, *_) = plan(Ledger(results), tiny_study())
-    assert stored.size == path.stat().st_size
-    path.unlink()
-    (estimated,) = [p for p in plan(Ledger(results), tiny_study()) if p.label == stored.label and p.stage == PHYSICS]
-    assert estimated.size is not None and 0.5 < estimated.size / stored.size < 2.0
-
-
-def test_references_without_a_size_count_as_the_mean_of_the_others():
-    sized, unsized = (replace(piece(PHYSICS, "reference", 1.0), size=size) for size in (300, None))
-    case = replace(piece(PHYSICS, "case", 1.0), size=10)
-    assert expected_bytes([sized, unsized, case]) == (610, 0)
-    assert expected_bytes([unsized, unsized, case]) == (10, 2)
 
 
 def log() -> Console:

@@ -41,7 +41,7 @@ def demo(results: Results = Path("organbench-demo")) -> None:
         do(job)
         ledger.look_again()
         if not ledger.can_be_timed(job):
-            raise StudyError(f"{job.work.name} did not run: {read_record(job.path()).message}")
+            raise StudyError(f"{job.work.name} did not run: {read_record(job.path).message}")
         time_frames(job)
     ledger.look_again()
     runs, problems = load_runs(results, DEMO)

@@ -58,7 +58,6 @@ def run(
     ] = None,
     on: Annotated[str, typer.Option(help=f"{WORDS} (docs/cluster.md)")] = "",
     again: Annotated[str, typer.Option(help=AGAIN)] = "",
-    portable: Annotated[bool, typer.Option(help="the same bits on every x86-64 processor; slower")] = False,
     organs: Annotated[str, typer.Option(help="run on the surfaces of this folder: FOLDER or FOLDER:mm")] = "",
     dry: Annotated[bool, typer.Option("--dry-run", help="only print what would run, why, and for how long")] = False,
     report: Annotated[bool, typer.Option("--report", help="then do what `organbench report` does")] = False,
@@ -69,7 +68,7 @@ def run(
     if case and report:
         raise StudyError("give either --case or --report: a report shows whole studies")
     if again:
-        _check_again(again, {"--on": on, "--only": only, "--portable": portable})
+        _check_again(again, {"--on": on, "--only": only})
     root, rules, failures = results / SMOKE if smoke else results, _rules(only), Failures()
     ledger = Ledger(root)
     if organs:
@@ -85,7 +84,7 @@ def run(
         warn(warnings)
     if todo and report and not (on or dry):
         _compile()
-    with executor_for(on, jobs or JOBS, portable, root, say) as executor:
+    with executor_for(on, jobs or JOBS, root, say) as executor:
         for study in chosen:
             if again:
                 _time_again(ledger, study, dry, not case)
@@ -215,5 +214,5 @@ def _selection(ledger: Ledger, study: Study, rules: list[Rule]) -> Selection:
     if not rules:
         return None
     jobs = jobs_of(ledger.root, [study])
-    chosen = {job.path().absolute() for job in jobs if any(rule(ledger, job) for rule in rules)}
-    return lambda job: job.path().absolute() in chosen
+    chosen = {job.path.absolute() for job in jobs if any(rule(ledger, job) for rule in rules)}
+    return lambda job: job.path.absolute() in chosen

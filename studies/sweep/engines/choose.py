@@ -18,14 +18,14 @@ NO_WORKER_SECONDS = 60.0
 WORDS = "local:N, an address as tcp://HOST:8786, or a FILE.yaml"
 
 
-def executor_for(on: str, jobs: int, portable: bool, root: Path, tell: Callable[[str], object]) -> Executor:
+def executor_for(on: str, jobs: int, root: Path, tell: Callable[[str], object]) -> Executor:
     """The executor of `organbench run --on`.
 
     on: one of WORDS, "" for `jobs` processes of this machine; root: the results folder; tell: reports on workers.
     Raises StudyError for other words, and where the extra `cluster` is not installed.
     """
     if not on or on.split(":")[0] == LOCAL:
-        return Local(_count(on, jobs), portable)
+        return Local(_count(on, jobs))
     if "://" not in on and not on.endswith((".yaml", ".yml")):
         raise StudyError(f"--on {on!r} is not known; give {WORDS}")
     try:
@@ -36,12 +36,10 @@ def executor_for(on: str, jobs: int, portable: bool, root: Path, tell: Callable[
             raise
         raise StudyError(f"--on {on} {NEEDED}") from error
     if "://" in on:
-        return Cluster(lambda: nullcontext(on), NO_WORKER_SECONDS, portable)
+        return Cluster(lambda: nullcontext(on), NO_WORKER_SECONDS)
     settings = read_settings(Path(on))
     begun = partial(scheduler_with_workers, settings, root, tell)
-    return Cluster(
-        begun, 3600 * settings.wait_hours, portable or settings.portable, settings.workers * settings.processes
-    )
+    return Cluster(begun, 3600 * settings.wait_hours, settings.workers * settings.processes)
 
 
 def _count(on: str, jobs: int) -> int:

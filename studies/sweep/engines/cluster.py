@@ -23,7 +23,7 @@ from studies.catalog.study import Study
 from studies.runs.user_code import Given, given_files
 from studies.store.ledger import Ledger
 from studies.sweep.engines.requests import DoJob, FrameTimes, Preparation, check_for, wait_until_seen
-from studies.sweep.engines.worker import MEGABYTES, JobPlugin, do, machine
+from studies.sweep.engines.worker import JobPlugin, do, machine
 from studies.sweep.executor import CompileListener, Progress
 from studies.sweep.job import Job, case_jobs
 from studies.sweep.local import environment, files_for
@@ -92,12 +92,11 @@ class Session:
             raise StudyError(f"{error}; nothing has run") from error
         self.client.subscribe_topic(self.name, lambda event: self.faults.put(event[1]))
 
-    def submit(self, request: Any, megabytes: float = 0.0, **options: Any) -> Future:
+    def submit(self, request: Any, **options: Any) -> Future:
         """Has a request answered by a process of a fit worker."""
         self.submitted += 1
         options |= {"key": f"{self.name}-{self.submitted}", "priority": -self.submitted, "pure": False}
-        resources = {self.name: 1, MEGABYTES: megabytes}
-        return self.client.submit(do, self.name, pickle.dumps(request), resources=resources, **options)
+        return self.client.submit(do, self.name, pickle.dumps(request), resources={self.name: 1}, **options)
 
     def result(self, future: Future) -> Any:
         """The answer. Raises StudyError when the scheduler is gone, what the request raised, Died, and KilledWorker."""
@@ -115,16 +114,6 @@ class Session:
             raise StudyError(GONE) from error
         return [future for future in futures if future.done()]
 
-    def check_memory(self, jobs: Sequence[Job], needs: Sequence[float]) -> None:
-        """Raises StudyError when a job needs more memory than any fit worker has."""
-        limits = [worker["resources"][MEGABYTES] for worker in self.fit().values()]
-        if limits and needs and max(needs) > max(limits):
-            job = jobs[needs.index(max(needs))]
-            raise StudyError(
-                f"{job.label} needs about {max(needs) / 1e3:.1f} GB, and the largest worker has "
-                f"{max(limits) / 1e3:.1f} GB: start one with more (`organbench worker --memory`)"
-            )
-
     def end(self) -> None:
         """Ends what is being done, and the processes on all workers."""
         with suppress(Exception):  # the scheduler may be gone
@@ -138,12 +127,11 @@ class Cluster:
         self,
         scheduler: Callable[[], AbstractContextManager[str]],
         patience: float,
-        portable: bool = False,
         to_come: int = 1,
     ) -> None:
         """scheduler: makes its address; patience: seconds without any worker that are waited; to_come: jobs that
         workers not yet there will do at a time."""
-        self.scheduler, self.patience, self.portable, self.to_come = scheduler, patience, portable, to_come
+        self.scheduler, self.patience, self.to_come = scheduler, patience, to_come
         self.stack = ExitStack()
         self.client: Client | None = None
 
@@ -166,12 +154,12 @@ class Cluster:
         return self.client
 
     @contextmanager
-    def _session(self, root: Path, files: tuple[Given, ...], portable: bool) -> Iterator[Session]:
+    def _session(self, root: Path, files: tuple[Given, ...]) -> Iterator[Session]:
         session = Session(self._connected(), self.patience)
         preparation = pickle.dumps(Preparation(os.getcwd(), files))
         try:
             with check_for(root, files) as check:
-                session.begin(JobPlugin(session.name, environment(portable), preparation, pickle.dumps(check)))
+                session.begin(JobPlugin(session.name, environment(), preparation, pickle.dumps(check)))
                 yield session
         finally:
             session.end()
@@ -181,19 +169,17 @@ class Cluster:
         a worker that is lost costs those a try that it had."""
         if not jobs:
             return
-        with self._session(jobs[0].root, files_for(jobs), self.portable) as session:
-            needs = [job.needs / 1e6 for job in jobs]
-            session.check_memory(jobs, needs)
+        with self._session(jobs[0].root, files_for(jobs)) as session:
             waiting, running, done = deque(range(len(jobs))), dict[Future, int](), list[Path]()
             while waiting or running:
                 slots = sum(worker["nthreads"] for worker in session.fit().values())
                 while waiting and len(running) < slots:
                     number = waiting.popleft()
-                    running[session.submit(DoJob(jobs[number]), needs[number], retries=TRIES - 1)] = number
+                    running[session.submit(DoJob(jobs[number]), retries=TRIES - 1)] = number
                 for future in session.ended(running):
                     job = jobs[running.pop(future)]
                     cause = _cause(session, future)
-                    done += [job.path()] if cause is None else []
+                    done += [job.path] if cause is None else []
                     yield job, cause
         wait_until_seen(done)
 
@@ -203,12 +189,12 @@ class Cluster:
         """As every executor: on one worker of each kind of machine, after all jobs, one machine after the other."""
         root = ledger.root.absolute()
         timed = [job for job in case_jobs(root, study) if job.work.timed]
-        cases, chosen = tuple(job.work for job in timed), [t for t in timed if among is None or t.path() in among]
+        cases, chosen = tuple(job.work for job in timed), [t for t in timed if among is None or t.path in among]
         ledger.look_again()
         if not chosen or (self.client is None and all(map(ledger.timed_somewhere, chosen))):
             return 0
         request = FrameTimes(root, study.name, cases, None if among is None else frozenset(among))
-        with self._session(root, given_files(cases), portable=False) as session:
+        with self._session(root, given_files(cases)) as session:
             names = {place: str(worker["name"]) for place, worker in session.fit().items()}
             kinds: Any = session.client.run(machine, session.name, workers=list(names))
             places = {kinds[place]: place for place in sorted(kinds, key=names.__getitem__, reverse=True)}

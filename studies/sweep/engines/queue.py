@@ -84,8 +84,6 @@ class Settings:
     """Name or number under which workers reach this machine; empty: determined here."""
     wait_hours: Annotated[float, Field(gt=0)] = 24.0
     """For the first worker, and whenever there is none."""
-    portable: bool = False
-    """As `--portable`."""
 
 
 def read_settings(path: Path) -> Settings:

@@ -17,11 +17,6 @@ from distributed import Worker, WorkerPlugin, get_worker
 from studies.base.errors import StudyError
 from studies.base.processes import Child, Died, Message, Tell
 
-MEGABYTES = "organbench-MB"
-"""Dask's resource that a job takes its memory from."""
-UNLIMITED = 1e12
-"""Of that, on a worker without a limit."""
-
 
 def do(session: str, request: bytes) -> bytes:
     """In a Dask job: has a pickled request (studies.sweep.engines.requests) done; its pickled answer. Raises Died.
@@ -52,9 +47,7 @@ class JobPlugin(WorkerPlugin):
             fault = f"worker {worker.name} {fault}"
             worker.log_event(self.session, fault)
             raise StudyError(fault)
-        limit = worker.memory_manager.memory_limit
-        granted = {self.session: worker.state.nthreads, MEGABYTES: limit / 1e6 if limit else UNLIMITED}
-        await worker.set_resources(**granted)
+        await worker.set_resources(**{self.session: worker.state.nthreads})
 
     async def teardown(self, worker: Worker) -> None:
         """The client has ended."""

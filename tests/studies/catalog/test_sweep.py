@@ -121,7 +121,7 @@ def test_references_are_shared_and_come_first(tmp_path):
     jobs = jobs_of(tmp_path, [one, two])
     assert [job.label for job in jobs[:2]] == ["reference larger", "reference ball_squeeze"]
     assert len(jobs) == 2 + 4  # a reference of each scene, shared; two cases of each study
-    assert len({job.path() for job in jobs}) == 6
+    assert len({job.path for job in jobs}) == 6
 
 
 def test_a_study_scene_by_scene_finishes_one_before_the_next_and_after_the_others(tmp_path):

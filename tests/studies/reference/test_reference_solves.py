@@ -183,7 +183,7 @@ def test_runs_are_loaded_without_a_reference_that_failed(solved, tmp_path, mesh_
     assert runs[0].reference is None
     assert len(remarks) == 1
     assert FOLDS in remarks[0]
-    job.path().unlink()
+    job.path.unlink()
     assert "no results file" in load_runs(root, study)[1][0]
 
 

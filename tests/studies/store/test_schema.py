@@ -64,12 +64,10 @@ def test_what_a_run_writes_is_what_its_tables_list(finished_sweep):
         SECONDS,
         *(name for name in LAYOUTS["run"][1] if name.startswith("cut_")),
         "league",
-        "portable",
-        "restamped",
     }  # with an option
     timing = read_record(timing_file(finished_sweep, "tiny", tiny_case(timed=True)))
     assert set(timing.fields) == set(LAYOUTS["timing"][0])
-    assert set(timing.attributes) == set(LAYOUTS["timing"][1]) - {"restamped"}
+    assert set(timing.attributes) == set(LAYOUTS["timing"][1])
 
 
 def test_a_field_without_a_line_in_a_table_is_refused():

@@ -84,14 +84,14 @@ def test_rates_are_those_of_this_machine(results):
     study = tiny_study()
     jobs = jobs_of(results, [study])
     measured = rates(Ledger(results), jobs)["case"]
-    stored = [read_record(job.path()).attributes["seconds"] for job in jobs]
+    stored = [read_record(job.path).attributes["seconds"] for job in jobs]
     assert measured == pytest.approx(sum(stored) / sum(case_seconds(job.work) for job in jobs))
     path = case_path(results, "tiny", tiny_case())
     path.unlink()
     (piece, *_) = plan(Ledger(results), study)
     assert piece.here and piece.guess > 0
     for job in jobs[1:]:
-        write_record(job.path(), replace(read_record(job.path()), machine="0" * len(machine_id())))
+        write_record(job.path, replace(read_record(job.path), machine="0" * len(machine_id())))
     assert rates(Ledger(results), jobs) == {}, "what another machine stored says nothing of this one"
 
 

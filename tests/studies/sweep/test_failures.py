@@ -66,9 +66,9 @@ def test_a_piece_that_died_is_stored_as_failed(tmp_path):
 
 def test_what_another_command_has_done_meanwhile_is_not_done_again(results):
     (job,) = (job for job in jobs_of(results, [tiny_study()]) if job.work == tiny_case(timed=True))
-    planned = replace(job, initial_state=job.state())
+    planned = replace(job, initial_state=job.state)
     assert not planned.done_meanwhile(), "its file is that of the plan"
-    path = job.path()
+    path = job.path
     write_record(path, read_record(path))
     before = path.read_bytes(), path.stat().st_mtime_ns
     assert planned.done_meanwhile() and do(planned) == path

@@ -1,6 +1,5 @@
 """Results of several machines in one folder."""
 
-from collections import Counter
 from dataclasses import replace
 
 from studies.runs.current import case_path
@@ -28,15 +27,6 @@ def test_status_says_how_many_kinds_of_machines_a_study_mixes(results, tiny_file
         f"made on 2 kinds of processors, whose results differ by rounding: 2 of machine {here}, 1 of machine 00000000"
     )
     assert f"  {sentence}\n" in shown
-
-
-def test_portable_results_are_equal_on_every_machine(results):
-    study = tiny_study()
-    for case, machine in zip(study.cases, ("1", "2", "3"), strict=True):
-        record = read_record(case_path(results, "tiny", case))
-        stored_by(results, case, machine=machine, attributes={**record.attributes, "portable": "yes"})
-    assert mixture(machines_of(standings(Ledger(results), study))) is None
-    assert str(mixture(Counter({"a": 2, "any": 1}))).endswith("differ by rounding: 2 of machine a, 1 portable")
 
 
 def test_stale_results_do_not_count(results):

@@ -94,7 +94,6 @@ def test_old_times_stay_where_the_new_ones_are_not_whole(results, monkeypatch):
         (("--again", "timings"), "unknown value of --again 'timings'; did you mean 'timing'"),
         (("--again", "timing", "--only", "failed"), "leave out --only"),
         (("--again", "timing", "--on", "local:2"), "leave out --on"),
-        (("--again", "timing", "--portable"), "leave out --portable"),
     ],
     ids=lambda value: " ".join(value) if isinstance(value, tuple) else "",
 )

@@ -145,12 +145,11 @@ memory_gb: 32
 queue: short
 options: ["--account=surgery"]
 setup: ["module load python"]
-portable: true
 """
 
 
 def chosen(on, jobs=2):
-    return executor_for(on, jobs, False, Path("results"), print)
+    return executor_for(on, jobs, Path("results"), print)
 
 
 def test_words_say_where_jobs_run(tmp_path):
@@ -158,8 +157,8 @@ def test_words_say_where_jobs_run(tmp_path):
     file.write_text(FULL)
     assert [chosen(""), chosen("local", 3), chosen("local:4")] == [Local(2), Local(3), Local(4)]
     there, array = chosen("tcp://127.0.0.1:8786"), chosen(str(file))
-    assert isinstance(there, Cluster) and not there.portable
-    assert isinstance(array, Cluster) and array.portable and array.to_come == 8 * 16
+    assert isinstance(there, Cluster)
+    assert isinstance(array, Cluster) and array.to_come == 8 * 16
 
 
 @pytest.mark.parametrize(
