@@ -17,12 +17,12 @@ from studies.reference.published import Entry, fingerprint_of, published, record
 from studies.reference.reference_solves import STUDY as REFERENCES
 from studies.reference.reference_solves import ReferenceSolve, reference_solves
 from studies.runs.case import Case
-from studies.runs.current import case_fingerprint, case_path
+from studies.runs.current import case_fingerprint
 from studies.runs.user_code import files_of
 from studies.scene.scene import Scene
 from studies.store.entry import file_state, read_entry, why_entry_is_stale
 from studies.store.new_record import new_record
-from studies.store.paths import key_digest
+from studies.store.paths import SUFFIX, file_stem, key_digest, study_folder
 from studies.store.record import Status, write_record
 from studies.sweep.estimate import case_seconds, solve_seconds, unknowns
 
@@ -42,9 +42,19 @@ class Job(ABC):
     """A Case or a ReferenceSolve: what it computes."""
     initial_state: tuple[int, ...] | None = field(default=None, compare=False)
     """State of its file when the sweep began; None where there was none."""
+    digest: str = field(init=False, compare=False)
+    """SHA-256 (hex) of what it computes."""
+    path: Path = field(init=False, compare=False)
+    """Where its record lies."""
 
     kind: ClassVar[str]
     """ "case" or "reference"."""
+
+    def __post_init__(self) -> None:
+        digest = key_digest(self.work.key)
+        file = f"{file_stem(self.work.name, digest)}{SUFFIX}"
+        object.__setattr__(self, "digest", digest)
+        object.__setattr__(self, "path", study_folder(self.root, self.study) / file)
 
     @property
     @abstractmethod
@@ -66,11 +76,6 @@ class Job(ABC):
     def fingerprint(self) -> str:
         """Hash of the code that computes it."""
 
-    @property
-    @abstractmethod
-    def path(self) -> Path:
-        """Where its record lies."""
-
     @abstractmethod
     def run(self) -> Path:
         """Computes it and stores the result; where the record lies. Raises StudyError when it cannot be stored."""
@@ -86,11 +91,6 @@ class Job(ABC):
         failed = new_record(**head, status=Status.FAILED, message=cause, attributes=attributes, fields={})
         write_record(self.path, failed)
         return self.path
-
-    @cached_property
-    def digest(self) -> str:
-        """SHA-256 (hex) of what it computes."""
-        return key_digest(self.work.key)
 
     @property
     def state(self) -> tuple[int, ...] | None:
@@ -126,10 +126,6 @@ class CaseJob(Job):
     @property
     def fingerprint(self) -> str:
         return case_fingerprint(self.work)
-
-    @cached_property
-    def path(self) -> Path:
-        return case_path(self.root, self.study, self.work)
 
     def run(self) -> Path:
         from studies.runs.run import run_case  # with the solver, which takes most of a second to load
@@ -170,10 +166,6 @@ class ReferenceJob(Job):
     @property
     def fingerprint(self) -> str:
         return fingerprint_of(self.work.scene)
-
-    @cached_property
-    def path(self) -> Path:
-        return self.work.path(self.root)
 
     def run(self) -> Path:
         """A mesh that cannot be made is stored as a failure: it costs its scene, not the sweep."""

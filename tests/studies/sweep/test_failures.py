@@ -12,6 +12,7 @@ import pytest
 
 from studies.base.errors import StudyError
 from studies.metrics.timing.alone import alone
+from studies.reference.reference_solves import STUDY as REFERENCES
 from studies.reference.reference_solves import reference_solves
 from studies.runs.current import case_path
 from studies.scene.library import BALL_CLAMPED
@@ -147,7 +148,7 @@ def test_a_mesh_that_cannot_be_made_is_stored_as_failed_with_its_reason(tmp_path
         raise StudyError("ball: use more nodes")
 
     monkeypatch.setattr("studies.reference.solve.solve", refuse)
-    job = ReferenceJob(tmp_path, "made_up", reference_solves(UNPUBLISHED)[0])
+    job = ReferenceJob(tmp_path, REFERENCES, reference_solves(UNPUBLISHED)[0])
     stored = peek(do(job))
     assert (stored.status, stored.message) == (Status.FAILED, "ball: use more nodes")
     assert Ledger(tmp_path).why(job) is None
@@ -156,7 +157,7 @@ def test_a_mesh_that_cannot_be_made_is_stored_as_failed_with_its_reason(tmp_path
 def test_equations_without_a_solution_cost_one_scene_and_not_the_sweep(tmp_path, monkeypatch):
     """A stomach of the population ended a study of five hours by a dense system without an inverse."""
     monkeypatch.setattr("studies.reference.solve.solve", lambda *_: np.linalg.solve(np.zeros((1, 1)), np.ones(1)))
-    job = ReferenceJob(tmp_path, "made_up", reference_solves(UNPUBLISHED)[0])
+    job = ReferenceJob(tmp_path, REFERENCES, reference_solves(UNPUBLISHED)[0])
     stored = peek(do(job))
     assert (stored.status, stored.message) == (
         Status.FAILED,
@@ -171,4 +172,4 @@ def test_a_result_that_cannot_be_stored_ends_the_sweep(tmp_path, monkeypatch):
     monkeypatch.setattr("studies.reference.solve.solve", full)
     monkeypatch.setattr("studies.sweep.job.write_record", full)
     with pytest.raises(StudyError, match="no space is left"):
-        do(ReferenceJob(tmp_path, "made_up", reference_solves(UNPUBLISHED)[0]))
+        do(ReferenceJob(tmp_path, REFERENCES, reference_solves(UNPUBLISHED)[0]))
