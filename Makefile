@@ -41,7 +41,7 @@ publish-plan: setup-run ## what `make publish` would do, and how long it takes
 	$(BIN)/python -m studies.report.release --dry-run
 
 verify: setup-verify docs ## before a release: oracles, campaigns, browsers, clusters, wheels, notebooks (half an hour)
-	$(BIN)/organbench verify
+	$(BIN)/python -m studies.lab.verify
 	$(PYTEST) -m "campaign or lab"
 
 smoke: setup-run ## the main studies with their smallest settings: a quick check of the whole chain
@@ -77,13 +77,13 @@ stress: # its name until version 0.2
 figures: setup-run ## draw the charts again from the stored results
 	$(BIN)/organbench report --figures
 
-bench: setup-run ## measure the numbers that the README promises (quiet machine, please)
-	OMP_NUM_THREADS=1 MKL_NUM_THREADS=1 $(BIN)/python -m studies.bench.main
+bench: # its name until version 0.3
+	@echo "make bench is now make speeds" >&2; exit 2
 
 # asv takes the benchmarks of this commit and the code of either: OLD=v0.1 make speeds compares with a release.
 OLD ?= HEAD~1
 BENCH ?=
-ASV = OMP_NUM_THREADS=1 MKL_NUM_THREADS=1 $(BIN)/asv --config studies/bench/asv.conf.json
+ASV = OMP_NUM_THREADS=1 MKL_NUM_THREADS=1 $(BIN)/asv --config studies/lab/bench/asv.conf.json
 speeds: setup-run ## the promised speeds of the last commit against those of OLD, by asv (quiet machine, please)
 	$(BIN)/python -m pip install -q -c constraints.txt --no-build-isolation -e ".[bench]"
 	$(ASV) machine --yes

@@ -22,8 +22,10 @@ from .model.material import NeoHookean as NeoHookean
 from .model.obstacles import RigidCapsule as RigidCapsule
 from .model.obstacles import RigidPlane as RigidPlane
 from .model.obstacles import RigidSphere as RigidSphere
+from .model.problem import HeldNodes as HeldNodes
 from .model.problem import PrescribedDisplacement as PrescribedDisplacement
 from .model.problem import Problem as Problem
+from .model.problem import find_held as find_held
 from .statics.equilibrium import Checkpoint as Checkpoint
 from .statics.equilibrium import Equilibrium as Equilibrium
 from .statics.equilibrium import equilibrium_path as equilibrium_path

@@ -23,8 +23,13 @@ from .metrics.metric import Metric as Metric
 from .metrics.metrics import METRICS as METRICS
 from .metrics.run import Run as Run
 from .metrics.table import study_table as study_table
+from .reference.load import Reference as Reference
+from .reference.load import reference_for as reference_for
+from .reference.solved import solve_reference as solve_reference
 from .runs.case import BodyRecipe as BodyRecipe
 from .runs.case import Case as Case
+from .runs.prepare import Prepared as Prepared
+from .runs.prepare import prepare as prepare
 from .runs.run import measure as measure
 from .runs.user_code import own_law as own_law
 from .scene.library import SCENES as SCENES

@@ -32,7 +32,6 @@ GROUPS = {
         "advise": "Recommend the cheapest accurate body for a scene.",
         "safe-dt": "Predict the largest stable time step and verify it.",
         "profile": "Measure the stages of a time step in microseconds.",
-        "verify": "Check the reference against known solutions.",
         "fuzz": "Try to break every method with random trials.",
     },
     "Make meshes": {
@@ -57,6 +56,7 @@ FORMER = {
     "prune": "is gone: delete the folder of a study, and `organbench run` computes it again",
     "restamp": "is gone: `organbench run` computes what another code has made",
     "stress": "is now `organbench fuzz`",
+    "verify": "is now `python -m studies.lab.verify`, in a clone of the repository",
 }
 """Commands of earlier versions, and what stands in their place."""
 

@@ -9,7 +9,7 @@ from studies.reference.published import published, record_of
 from studies.reference.reference_solves import ReferenceSolve
 from studies.reference.sample import Sample, SamplePoints, samples_in
 from studies.reference.solution import Solution
-from studies.reference.uncertainty import Uncertainty, uncertainties
+from studies.reference.uncertainty import QUANTITIES, Uncertainty, uncertainties
 from studies.scene.scene import Scene
 from studies.store.record import Status, read_record
 
@@ -51,6 +51,22 @@ class Reference(Solution):
     def total_uncertainty(self) -> dict[str, float]:
         """Uncertainty of each quantity [1], relative to its size (docs, eq. 6.3)."""
         return {name: of_quantity.total for name, of_quantity in self.uncertainty.items()}
+
+    def apart(self, other: "Reference") -> dict[str, tuple[float, float]]:
+        """How far this reference is from another of the scene: quantity -> (difference, sum of both error bars), both
+        relative to the size of the quantity [1], at the sample points of this one."""
+        here, there = self._at(self.at), other._at(self.at)
+        return {
+            name: (QUANTITIES[name](self.at, here, there), bar + other.total_uncertainty[name])
+            for name, bar in self.total_uncertainty.items()
+        }
+
+    def _at(self, at: SamplePoints) -> Sample:
+        """The finest mesh, sampled at points of any reference of the scene."""
+        finest = self.meshes[0]
+        series = {name: self.field(name) for name in ("volume", "pressure", "lumen_pressure")}
+        u = self.displacement(at.points)
+        return Sample("", finest.unknowns, finest.size, u, self.force, **series, frequency=finest.frequency)
 
 
 def load_reference(root: Path, scene: Scene) -> Reference | None:

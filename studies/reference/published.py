@@ -2,7 +2,7 @@
 
 The reference of a benchmark must be the same for all users. A published reference is valid for a scene as long as the
 physics are the same: organ, tissue, obstacles, held regions and checkpoints. An edit of code makes none stale
-(`organbench verify --references` solves them again). A new set is a release with changed results.
+(`python -m studies.lab.references check` solves them again). A new set is a release with changed results.
 """
 
 import hashlib
@@ -19,6 +19,7 @@ import numpy as np
 from studies.base.errors import StudyError
 from studies.reference.reference_solves import ReferenceSolve, physics_of, reference_fingerprint, with_floats
 from studies.scene.as_json import scene_to_json
+from studies.scene.library import CUT, JUDGED
 from studies.scene.scene import Scene
 from studies.store.new_record import new_fields, new_record
 from studies.store.paths import key_digest
@@ -47,6 +48,15 @@ class Entry:
     def words(self) -> str:
         """For tables: the set, and which file."""
         return f"{self.name} {self.sha256[:8]}"
+
+
+def judged_scenes() -> dict[str, Scene]:
+    """Scenes of the catalogue whose reference is published, by name: all that have one, but those in which the faces of
+    a cut touch, those with several cuts, and those whose cut opens a lumen."""
+    opened = [
+        scene for scene in CUT if len(scene.cuts) == 1 and not (scene.cuts[0].contact or scene.cuts[0].opens_lumen)
+    ]
+    return {scene.name: scene for scene in (*JUDGED, *opened) if scene.reference is not None}
 
 
 def physics(scene: Scene) -> str:
@@ -133,3 +143,42 @@ def _values(dataset: h5py.Dataset) -> np.ndarray:
         return np.asarray(dataset.asstr()[()]).astype(str)
     values = np.asarray(dataset[()])
     return values.astype({"f": float, "u": np.int64}.get(values.dtype.kind, values.dtype))
+
+
+def write_published(folder: Path, name: str, records: Mapping[str, tuple[Scene, Record, Mapping[str, float]]]) -> Path:
+    """A set of references in a folder: by name of the scene the scene, its record and its error bars; returns the path
+    of the index. Other entries of the index do not change."""
+    folder.mkdir(parents=True, exist_ok=True)
+    path = folder / INDEX
+    listed = json.loads(path.read_text(encoding="utf-8"))["references"] if path.is_file() else {}
+    for title, (scene, record, bars) in records.items():
+        file = folder / f"{title}.h5"
+        write_file(file, record)
+        listed[title] = {
+            "file": file.name,
+            "sha256": hashlib.sha256(file.read_bytes()).hexdigest(),
+            "physics": physics(scene),
+            "unknowns": record.attributes["unknowns"],
+            "relative bars": {quantity: float(f"{bar:.3g}") for quantity, bar in bars.items()},
+        }
+    path.write_text(json.dumps({"set": name, "references": listed}, indent=1) + "\n", encoding="utf-8")
+    index.cache_clear()
+    return path
+
+
+def write_file(path: Path, record: Record) -> None:
+    """All fields of a reference, compressed, its lengths rounded to PRECISION of the largest displacement."""
+    largest = np.abs(record.fields["displacement"].values).max()
+    digits = int(np.ceil(-np.log10(2.0 * PRECISION * largest)))
+    with h5py.File(path, "w", libver="v110") as file:
+        file.attrs.update(record.attributes)
+        for name, item in record.fields.items():
+            values = np.asarray(item.values)
+            if values.dtype.kind == "U":
+                file.create_dataset(name, data=values.astype(h5py.string_dtype()))
+            elif name in LENGTHS:
+                rounded = np.round(values, digits).astype(np.float32)
+                file.create_dataset(name, data=rounded, scaleoffset=digits, compression="gzip")
+            else:
+                options = {"compression": "gzip", "shuffle": True} if values.size > 100 else {}
+                file.create_dataset(name, data=values.astype(np.uint32) if name == "tetrahedra" else values, **options)

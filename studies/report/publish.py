@@ -40,7 +40,6 @@ from studies.store.record import peek
 from studies.store.stamps import is_stamped
 from studies.sweep.frame_times import timed_jobs
 from studies.sweep.standings import standings
-from studies.tools.verify.verification import FOLDER as VERIFY
 
 PUBLISHED = Path("results") / "published"
 """Below the folder of README.md; the only part of results/ that git keeps."""
@@ -60,7 +59,7 @@ class Extra:
 
 
 EXTRAS = {
-    VERIFY: Extra("organbench verify", ("studies.tools.verify.verification",)),
+    "verify": Extra("python -m studies.lab.verify", ()),
     FIGURES: Extra(
         "organbench report --figures",
         (
@@ -68,7 +67,6 @@ EXTRAS = {
             "studies.runs.paper",
         ),
     ),
-    "bench.csv": Extra("make bench", ("studies.bench.main",)),
     "breaking": Extra(
         "make fuzz",
         (*(f"{FUZZ}.{name}" for name in ("campaign", "outcome", "trial")), "studies.plots.campaigns.breaking"),
@@ -77,7 +75,6 @@ EXTRAS = {
         "make fuzz", tuple(f"{FUZZ}.reference.{name}" for name in ("outcome", "table", "trial"))
     ),
     "breaking_cuts": Extra("make fuzz", (f"{FUZZ}.campaign", f"{FUZZ}.cuts")),
-    "geometry.csv": Extra("python -m studies.bench.meshes", ("studies.bench.meshes",)),
     "silicone": Extra("python -m studies.tools.silicone.main", ("studies.tools.silicone.main",)),
     LEAGUE: Extra("make study-league", ("studies.exchange.peers.main", "studies.report.league.page", *ADAPTERS)),
     SWEEP: Extra("python -m studies.exchange.peers.main --sweep", ("studies.exchange.peers.main", *ADAPTERS)),

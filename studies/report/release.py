@@ -8,12 +8,12 @@ import subprocess
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from reference_fem import crosscheck
 from studies.base.errors import StudyError
 from studies.catalog import STUDIES, Study
 from studies.report.publish import APART, EXTRAS, KEPT, LEAGUE, PUBLISHED, REFERENCES, SWEEP, is_current
@@ -28,11 +28,9 @@ JOBS = 2
 MINUTES = {
     "make study-league": 30.0,
     "python -m studies.exchange.peers.main --sweep": 15.0,
-    "organbench verify": 20.0,
+    "python -m studies.lab.verify": 20.0,
     "organbench report --figures": 5.0,
-    "make bench": 10.0,
     "make fuzz": 30.0,
-    "python -m studies.bench.meshes": 10.0,
     "python -m studies.tools.silicone.main": 10.0,
 }
 """Approximate minutes on two otherwise idle cores; the time of a study follows from its cases."""
@@ -140,8 +138,8 @@ def main(
     if dry:
         return
     print(f"commit {check_commit(Path('.'))}", flush=True)
-    if not crosscheck.available():
-        raise StudyError("NGSolve, a second opinion in `organbench verify`, is missing; install organbench[crosscheck]")
+    if find_spec("ngsolve") is None:
+        raise StudyError("NGSolve, a second opinion of the reference, is missing; install organbench[crosscheck]")
     for number, step in enumerate(all_steps, 1):
         ledger.look_again()
         if not seconds_of(step, ledger):

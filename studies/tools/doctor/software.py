@@ -24,7 +24,7 @@ NATIVE = ("numba", "h5py", "gmsh", "mmgpy")
 PURPOSE = {
     "masks": "label masks of scans (NIfTI, NRRD)",
     "view": "reads the files of `organbench view` without ParaView",
-    "crosscheck": "the second finite-element code of `organbench verify`",
+    "crosscheck": "the second finite-element code of `python -m studies.lab.verify`",
     "parquet": "`organbench table --parquet`",
     "cluster": "`organbench run --on` workers of other machines",
 }

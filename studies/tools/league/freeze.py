@@ -17,8 +17,7 @@ from studies.catalog.population.draw import member
 from studies.exchange.league.frozen import FILE, SET, mesh_key
 from studies.exchange.meshes import given_meshes
 from studies.reference.load import load_reference
-from studies.reference.publish import write_file
-from studies.reference.published import FOLDER, INDEX, physics, published
+from studies.reference.published import FOLDER, INDEX, physics, published, write_file
 from studies.reference.reference_solves import ReferenceSolve
 from studies.reference.solve import solve
 from studies.scene.as_json import scene_to_json
@@ -66,7 +65,7 @@ def held_back(organ: str, folder: Path, solved: bool) -> dict[str, Any]:
         solve(place / "solved", ReferenceSolve(scene))
         reference = load_reference(place / "solved", scene)
         assert reference is not None  # members have a plan
-        write_file(file, reference)
+        write_file(file, reference.record)
     digest = hashlib.sha256(file.read_bytes()).hexdigest() if file.exists() else ""
     nodes = tuple(max(count, LEAST.get(organ, 0)) for count in NODES)
     return {"reference": digest, "physics": physics(scene), "meshes": meshes_of(scene, nodes)}

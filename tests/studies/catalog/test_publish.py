@@ -13,7 +13,7 @@ from studies.cli.commands import publish as command
 from studies.cli.commands import report as report_command
 from studies.metrics.timing.cases import timing_file
 from studies.report import publish as publishing
-from studies.report.publish import EXTRAS, PUBLISHED, between, check, publish, publish_some
+from studies.report.publish import EXTRAS, PUBLISHED, Extra, between, check, publish, publish_some
 from studies.report.published_code import CURRENT, FILE, STALE, UNKNOWN, noted, study_code
 from studies.report.sentences import Sentences
 from studies.report.summaries import SUMMARIES
@@ -30,6 +30,13 @@ PAGE = SUMMARIES[0].page
 HEADLINE = replace(
     tiny_study(charts=(Chart("one.png", lambda runs, path: path.write_bytes(b"a picture")),)), name="volume_loss"
 )
+
+
+@pytest.fixture(autouse=True)
+def two_tables(monkeypatch):
+    """That belong to no study."""
+    monkeypatch.setitem(EXTRAS, "bench.csv", Extra("make bench", ("studies.runs.run",)))
+    monkeypatch.setitem(EXTRAS, "geometry.csv", Extra("make geometry", ("studies.geometry.mesh.quality",)))
 
 
 @pytest.fixture
@@ -144,7 +151,7 @@ def test_the_command_publishes_where_it_stands_or_says_one_sentence(current, hom
     monkeypatch.setattr(command, "STUDIES", (HEADLINE,))
     code, out, err = organbench("publish", "--results", current)
     assert (code, err) == (0, "") and str(PUBLISHED / "volume_loss" / "one.png") in out
-    assert "kept as published: verify: organbench verify; figures: organbench report" in out
+    assert "kept as published: verify: python -m studies.lab.verify; figures: organbench report" in out
     before = shown(home)
     miss(current, monkeypatch)
     code, out, err = organbench("publish", "--results", current)
@@ -271,7 +278,7 @@ def test_what_is_published_is_current_until_the_code_that_makes_it_changes(curre
     other = replace(HEADLINE, cases=HEADLINE.cases[:-1])
     assert status_of(home, other) == dict.fromkeys(names, STALE) | {"bench.csv": CURRENT, block: CURRENT}
     # Other code of one maker.
-    monkeypatch.setitem(EXTRAS, "bench.csv", replace(EXTRAS["bench.csv"], makers=("studies.bench.meshes",)))
+    monkeypatch.setitem(EXTRAS, "bench.csv", replace(EXTRAS["bench.csv"], makers=("studies.geometry.mesh.quality",)))
     assert status_of(home, HEADLINE) == dict.fromkeys(names, CURRENT) | {"bench.csv": STALE}
     # A page that somebody edited.
     (home / PAGE).write_text((home / PAGE).read_text().replace(f"{BEGIN}\n", f"{BEGIN}\nby hand\n"))

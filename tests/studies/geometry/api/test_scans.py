@@ -8,16 +8,31 @@ import numpy as np
 import pytest
 
 from studies.base.errors import StudyError
-from studies.bench.scans import hausdorff_share, main
 from studies.geometry import check_surface, check_tetrahedra, scan
 from studies.geometry.api.scans import raw_surface
 from studies.geometry.mesh.organ_mesh import signed_volume
 from studies.geometry.mesh.quality import dihedral_angles, tetrahedron_radius_ratio
+from studies.geometry.surface.distance import distance_to_surface
 from tests.studies.geometry.boxes import box, split, together
 from tests.studies.geometry.real import NAMES, real_surface
 
 MM = 1e-3
 SPLEEN = "spleen_hra_550"
+
+
+def hausdorff_share(mesh, points, triangles):
+    """Sampled two-sided Hausdorff distance of the outer surface to another, over the diagonal of the other's box."""
+    here = mesh.points[: mesh.outer_count], mesh.outer_triangles
+    away = distance_to_surface(samples(*here), points, triangles).max()
+    back = distance_to_surface(samples(points, triangles), *here).max()
+    return max(away, back) / np.linalg.norm(np.ptp(points[np.unique(triangles)], axis=0))
+
+
+def samples(points, triangles):
+    """Nodes, centroids of triangles and middles of edges (m, 3)."""
+    corners = points[triangles]
+    middles = ((corners + np.roll(corners, 1, axis=1)) / 2.0).reshape(-1, 3)
+    return np.vstack([points[np.unique(triangles)], corners.mean(axis=1), middles])
 
 
 def write(path, points, triangles):
@@ -54,16 +69,6 @@ def test_hausdorff_distance_is_two_sided_and_sampled(balls):
     speck = box((0.2, 0, 0), (0.21, 0.01, 0.01))
     beyond = hausdorff_share(mesh, *together((points, faces), speck))
     assert beyond * np.hypot(0.26, 0.1) == pytest.approx(0.16, rel=0.1)
-
-
-def test_bench_prints_a_row_for_each_file(block, tmp_path, capsys):
-    write(tmp_path / "egg.ply", block[1], block[2].astype(np.int32))
-    (tmp_path / "bad.ply").write_text("no mesh")
-    assert main([str(tmp_path), "200"]) == 0
-    _, bad, egg = capsys.readouterr().out.strip().splitlines()
-    assert (bad.split()[0] == "bad" and "cannot be read" in bad) or "not a mesh" in bad
-    assert egg.split()[:2] == ["egg", "200"] and float(egg.split()[2]) < 3 and abs(float(egg.split()[4])) < 4
-    assert main([str(tmp_path / "none")]) == 2
 
 
 @pytest.fixture(scope="module")

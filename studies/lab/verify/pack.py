@@ -9,17 +9,10 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from reference_fem import SolveError, oracles
-from reference_fem.oracles import Check, Curve, Oracle, Outcome, kappa
-from studies.base.atomic import write_whole
-from studies.base.errors import StudyError
+from reference_fem import SolveError
+from reference_fem.oracles import ORACLES, Check, Oracle, Outcome, kappa
+from studies.lab.verify.second_opinion import second_opinions
 from studies.plots import verify as convergence
-from studies.tools.verify.second_judge import second_judges
-from studies.tools.verify.second_opinion import second_opinions
-
-FOLDER = "verify"
-ORACLES: tuple[Oracle, ...] = (*oracles.ORACLES, *second_opinions())
-"""The pack, with the second opinion where the code for it is installed."""
 
 
 @dataclass(frozen=True)
@@ -36,17 +29,15 @@ class Verdict:
         return tuple(check for check in self.outcome.checks if not check.met)
 
 
-def run_pack(root: Path, fast: bool, on_verdict: Callable[[Verdict], None]) -> list[Verdict]:
-    """Measures every oracle (`fast`: the fast half), cheap ones first, and the references of scenes below `root` that
-    have a second judge; on_verdict sees each as it is found."""
+def run_pack(fast: bool, on_verdict: Callable[[Verdict], None]) -> list[Verdict]:
+    """Measures every oracle (`fast`: the fast half), cheap ones first; on_verdict sees each as it is found."""
     verdicts = []
-    for oracle in sorted((*ORACLES, *second_judges(root)), key=lambda oracle: not oracle.fast):
+    for oracle in sorted((*ORACLES, *second_opinions()), key=lambda oracle: not oracle.fast):
         if fast and not oracle.fast:
             continue
         start = time.perf_counter()
-        verdict = Verdict(oracle, measured(oracle), time.perf_counter() - start)
-        verdicts.append(verdict)
-        on_verdict(verdict)
+        verdicts.append(Verdict(oracle, measured(oracle), time.perf_counter() - start))
+        on_verdict(verdicts[-1])
     return verdicts
 
 
@@ -54,7 +45,7 @@ def measured(oracle: Oracle) -> Outcome:
     """What an oracle finds; one that cannot be solved fails by a NaN, and the others still have their say."""
     try:
         return oracle.measure()
-    except (SolveError, StudyError) as problem:
+    except SolveError as problem:
         return Outcome((Check(f"not solved: {problem}", "1", 1.0, math.nan, 0.01, "none", 0),))
 
 
@@ -119,17 +110,13 @@ def closeness(check: Check) -> float:
     return 1.0 / max(used, 1e-300) if check.kind == "misses" else used
 
 
-def curves_of(verdicts: Sequence[Verdict]) -> list[Curve]:
-    """All errors over mesh size."""
-    return [curve for verdict in verdicts for curve in verdict.outcome.curves]
-
-
 def write_verdicts(folder: Path, verdicts: Sequence[Verdict]) -> list[Path]:
-    """Writes verify.csv, verify.md and convergence.png; their paths. Raises StudyError when one cannot be written."""
+    """Writes verify.csv, verify.md and convergence.png; their paths."""
+    folder.mkdir(parents=True, exist_ok=True)
     table, words, chart = (folder / name for name in ("verify.csv", "verify.md", "convergence.png"))
-    write_whole(table, check_table(verdicts).to_csv(index=False, float_format="%.9g").encode())
-    write_whole(words, summary(verdicts).encode())
-    convergence.draw(curves_of(verdicts), chart)
+    check_table(verdicts).to_csv(table, index=False, float_format="%.9g")
+    words.write_text(summary(verdicts), encoding="utf-8")
+    convergence.draw([curve for verdict in verdicts for curve in verdict.outcome.curves], chart)
     return [table, words, chart]
 
 
@@ -137,7 +124,6 @@ def write_kappa(folder: Path) -> list[Path]:
     """Solves and writes what kappa/mu does to a result: kappa.csv and kappa.png; their paths."""
     rows, ratios = kappa.dependence(), np.array(kappa.RATIOS)
     table, chart = folder / "kappa.csv", folder / "kappa.png"
-    frame = pd.DataFrame({"kappa/mu": ratios, **rows})
-    write_whole(table, frame.to_csv(index=False, float_format="%.9g").encode())
+    pd.DataFrame({"kappa/mu": ratios, **rows}).to_csv(table, index=False, float_format="%.9g")
     convergence.draw_kappa(ratios, rows, chart)
     return [table, chart]

@@ -17,11 +17,9 @@ from skfem import MeshTet
 from skfem.quadrature import get_quadrature
 from skfem.refdom import RefTet
 
-from reference_fem.elements.shapes import edge_index, nodes
-from reference_fem.errors import SolveError
-from reference_fem.model.material import NeoHookean
-from reference_fem.model.problem import HeldNodes, Problem, find_held
+from reference_fem import HeldNodes, NeoHookean, Problem, SolveError, find_held, nodes
 
+INVERSE = "sparsecholesky"
 EDGE = -0.125
 """Value of NGSolve's edge function half-way: u there is the mean of the ends plus this times the coefficient."""
 
@@ -48,22 +46,12 @@ class NgsolveSolution:
     """Pressure at the vertices, (N1,) [Pa]."""
     held_force: np.ndarray
     """Force of each held region on the body, (nh, 3) [N]; a shared unknown counts for the first region."""
-    iterations: int
-    """Newton iterations in all steps."""
 
 
-def to_ngsolve(mesh: MeshTet, boundaries: dict[str, np.ndarray] | None = None):
-    """The tetrahedra with straight sides as an NGSolve mesh, vertices in the same order.
-
-    boundaries: name -> facets of the boundary (f, 3), outward.
-    """
-    netgen = load("netgen.meshing")
-    net = netgen.Mesh(dim=3)
+def to_ngsolve(mesh: MeshTet):
+    """The tetrahedra with straight sides as an NGSolve mesh, vertices in the same order."""
+    net = load("netgen.meshing").Mesh(dim=3)
     net.AddPoints(np.ascontiguousarray(mesh.p[:, : mesh.nvertices].T))
-    for number, (name, facets) in enumerate((boundaries or {}).items()):
-        face = net.Add(netgen.FaceDescriptor(surfnr=number + 1, domin=1, domout=0, bc=number + 1))
-        net.SetBCName(number, name)
-        net.AddElements(dim=2, index=face, data=np.ascontiguousarray(facets, dtype=np.int32), base=0)
     net.AddElements(dim=3, index=1, data=np.ascontiguousarray(mesh.t[:4].T, dtype=np.int32), base=0)
     return load("ngsolve").Mesh(net)
 
@@ -109,7 +97,8 @@ class NgsolveModel:
         self.form = ng.BilinearForm(space, symmetric=True)
         self.form += ng.Variation(energy.Compile() * ng.dx(intrules={ng.ET.TET: rule}))
         pairs = np.array([[vertex.nr for vertex in edge.vertices] for edge in self.mesh.edges])
-        self.edges = edge_index(problem.mesh, pairs)
+        number = {tuple(sorted(pair)): at for at, pair in enumerate(problem.mesh.edges.T.tolist())}
+        self.edges = np.array([number[tuple(sorted(pair))] for pair in pairs.tolist()])
         check_middles(problem.mesh, self.held)
         self.free = ng.BitArray(space.ndof)
         self.free.Set()
@@ -153,32 +142,25 @@ class NgsolveModel:
         step[np.array(self.free)] = 0.0
         return step
 
-    def advance(self, t: float, inverse: str = "sparsecholesky", tolerance: float = 1e-9) -> int:
-        """To time t in one step: the prescribed increment through the tangent, then Newton; returns its iterations."""
+    def advance(self, t: float):
+        """To time t in one step: the prescribed increment through the tangent, then Newton."""
         form, vec = self.form, self.state.vec
         step = vec.CreateVector()
         step.FV().NumPy()[:] = self.increments(t)
         form.AssembleLinearization(vec)
         pulled = (form.mat * step).Evaluate()
-        vec.data += step - form.mat.Inverse(self.free, inverse=inverse) * pulled
-        return self.newton(inverse, tolerance)
+        vec.data += step - form.mat.Inverse(self.free, inverse=INVERSE) * pulled
+        self.newton()
 
-    def newton(self, inverse: str, tolerance: float, most: int = 20) -> int:
-        """Runs NGSolve's Newton solver from the current state; returns the number of iterations. Raises SolveError when
-        it does not converge."""
-        status, iterations = self.iterate(inverse, tolerance, most)
+    def newton(self, most: int = 20):
+        """Runs NGSolve's Newton solver from the current state. Raises SolveError when it does not converge."""
+        newton = load("ngsolve.solvers").Newton
+        with redirect_stdout(StringIO()):  # the status says what it prints
+            status, _ = newton(
+                self.form, self.state, freedofs=self.free, inverse=INVERSE, maxerr=1e-9, maxit=most, printing=False
+            )
         if status != 0:
             raise SolveError(f"NGSolve's Newton did not converge in {most} iterations: take shorter steps")
-        return iterations
-
-    def iterate(self, inverse: str, tolerance: float, most: int):
-        """(status, iterations) of NGSolve's Newton solver. Its printed output is discarded, since the status contains
-        it."""
-        newton = load("ngsolve.solvers").Newton
-        with redirect_stdout(StringIO()):
-            return newton(
-                self.form, self.state, freedofs=self.free, inverse=inverse, maxerr=tolerance, maxit=most, printing=False
-            )
 
     def forces(self):
         """Force of each held region, (nh, 3) [N], from the residual of NGSolve's form."""
@@ -201,6 +183,6 @@ class NgsolveModel:
 def solve(problem: Problem, times: Sequence[float]) -> NgsolveSolution:
     """The state at the last of the times, reached step by step; raises SolveError."""
     model = NgsolveModel(problem)
-    iterations = sum(model.advance(t) for t in times)
-    u, p = model.fields(model.vector())
-    return NgsolveSolution(u, p, model.forces(), iterations)
+    for t in times:
+        model.advance(t)
+    return NgsolveSolution(*model.fields(model.vector()), model.forces())

@@ -1,1 +1,0 @@
-"""The promised numbers, measured: `make bench`."""

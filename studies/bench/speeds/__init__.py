@@ -1,1 +1,0 @@
-"""The promised speeds over commits, for asv: `make speeds`."""

@@ -1,0 +1,1 @@
+"""The reference against closed forms, published numbers and another code."""

@@ -1,1 +1,0 @@
-"""The reference against known answers and other codes."""
