@@ -175,9 +175,7 @@ def test_a_new_method_is_a_file_and_a_line_and_nothing_else(repository):
     text = registry.read_text(encoding="utf-8").replace("    Free,\n", "    Free,\n    Added,\n", 1)
     imports = "from massspring.methods.added import Added\nfrom massspring.methods.barycentre"
     registry.write_text(text.replace("from massspring.methods.barycentre", imports, 1), encoding="utf-8")
-    assert " 0 broken" in run_in(
-        repository, "-c", "from importlinter.cli import lint_imports_command as c; c()"
-    )
+    assert " 0 broken" in run_in(repository, "-c", "from importlinter.cli import lint_imports_command as c; c()")
     assert re.search(r"^ +added +One division", run_in(repository, "-m", "studies", "list", "methods"), re.MULTILINE)
 
 

@@ -1,5 +1,6 @@
 """Frames of the mass-spring bodies whose speed is promised: 20 steps each, a short run to a sample."""
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -20,7 +21,7 @@ def ball(nodes: int, fill: bool = False):
     return studies.organ("ball", nodes, {}, fill, {"radius": RADIUS})
 
 
-def setup_of(body: ms.Body, method: ms.Method, frames: int, come, share: float = 1.0) -> ms.Setup:
+def setup_of(body: ms.Body, method: ms.Method, frames: int, come: Callable, share: float = 1.0) -> ms.Setup:
     """A body held below; what `come` makes of the clock's duration times `share` comes at it from above."""
     clock = ms.Clock(STEPS * 0.5 * ms.step_limit(body).undamped, frames, STEPS)
     bottom = ms.Attachment(body.surface_nodes[body.rest[body.surface_nodes, 2] < -0.8 * RADIUS].astype(np.int64))

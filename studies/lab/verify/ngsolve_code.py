@@ -97,7 +97,7 @@ class NgsolveModel:
         self.form = ng.BilinearForm(space, symmetric=True)
         self.form += ng.Variation(energy.Compile() * ng.dx(intrules={ng.ET.TET: rule}))
         pairs = np.array([[vertex.nr for vertex in edge.vertices] for edge in self.mesh.edges])
-        number = {tuple(sorted(pair)): at for at, pair in enumerate(problem.mesh.edges.T.tolist())}
+        number = {tuple(sorted(pair)): at for at, pair in enumerate(np.asarray(problem.mesh.edges).T.tolist())}
         self.edges = np.array([number[tuple(sorted(pair))] for pair in pairs.tolist()])
         check_middles(problem.mesh, self.held)
         self.free = ng.BitArray(space.ndof)

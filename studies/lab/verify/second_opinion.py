@@ -7,6 +7,7 @@ import numpy as np
 from scipy.spatial import KDTree
 from skfem import MeshTet
 
+from massspring import Sphere
 from reference_fem import (
     NeoHookean,
     NewtonSettings,
@@ -118,6 +119,7 @@ def thick_sphere(n: int = 6, layers: int = 4) -> Problem:
 def pulled_liver() -> Problem:
     """The liver on its bare area, a patch about the place where liver_probe touches it pulled outward."""
     mesh, (probe,) = organ("liver", 300), LIVER_PROBE.obstacles
+    assert isinstance(probe, Sphere)
     normal = -np.asarray(probe.path.displacements[-1]) / np.linalg.norm(probe.path.displacements[-1])
     place = np.asarray(probe.centre) - (probe.radius + GAP) * normal
     grip = np.flatnonzero(np.linalg.norm(mesh.points[: mesh.surface_count] - place, axis=1) < REACH)
