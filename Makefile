@@ -25,7 +25,7 @@ study: setup-run ## run the main studies, then the charts and tables (the main j
 
 study-%: setup-run ## run one study and draw it: make study-volume_loss
 	$(BIN)/organbench run $*
-	$(BIN)/organbench plot $*
+	$(BIN)/organbench report $*
 
 report: setup-run ## charts, tables and report.html, one page that opens anywhere, from the stored results
 	$(BIN)/organbench report
@@ -100,7 +100,7 @@ coverage: setup-dev ## lines of the kernels that their tests run, with the compi
 # A chart or table by its file name: results/STUDY/NAME.png, results/STUDY/NAME.csv
 results/%.png: setup-run FORCE ## one chart by its file name: make results/volume_loss/volume.png
 	$(BIN)/organbench run $(firstword $(subst /, ,$*))
-	$(BIN)/organbench plot $(firstword $(subst /, ,$*))
+	$(BIN)/organbench report $(firstword $(subst /, ,$*))
 	@test -f $@ || { echo "$@: this study draws no such chart; it has: $$(ls $(@D)/*.png)"; exit 2; }
 
 results/%.csv: setup-run FORCE ## one table by its file name: make results/volume_loss/volume_loss.csv

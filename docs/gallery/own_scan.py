@@ -28,7 +28,7 @@ meshio.write_points_cells("scan.ply", 1e3 * points, [("triangle", faces.astype(n
 # The mesh doctor names each fault and the option that repairs it. Its exit code is 1 if it found a fault.
 
 # %% language="bash"
-# organbench mesh-check scan.ply --unit mm || echo exit code $?
+# organbench mesh --check scan.ply --unit mm || echo exit code $?
 
 # %% [markdown]
 # ## A body of 150 surface nodes

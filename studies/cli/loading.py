@@ -15,16 +15,14 @@ GROUPS = {
     "Run studies": {
         "demo": "Squeeze a ball with three bodies, next to the reference.",
         "run": "Run what is missing or stale, then draw the charts.",
-        "status": "Count what is ok, failed, stale or missing, and say why.",
         "replay": "Run one stored case again and compare the results.",
         "worker": "Run tasks for `organbench run --on` until stopped.",
     },
     "Look at results": {
         "list": "List studies, scenes, organs, methods and metrics.",
-        "show": "Show a results file: status, numbers, fields with units.",
+        "show": "Show what is ok, failed, stale or missing, and why.",
         "table": "Print one row per case with the metrics of a study.",
-        "plot": "Draw the charts and the table of a study.",
-        "report": "Draw all charts and tables and write report.html.",
+        "report": "Draw charts and tables from what is stored.",
         "compare": "Compare two results folders number by number.",
         "view": "Write cases and their reference to a file for ParaView.",
     },
@@ -36,7 +34,6 @@ GROUPS = {
     },
     "Make meshes": {
         "mesh": "Mesh a synthetic organ or a surface in a file.",
-        "mesh-check": "List the faults of a mesh and how to repair each.",
         "place": "Place hold and probe on a scan and write a study.",
     },
     "Share, compare with other programs, maintain": {
@@ -51,10 +48,13 @@ GROUPS = {
 LINES = {name: line for lines in GROUPS.values() for name, line in lines.items()}
 FORMER = {
     "calibrate": "is gone: quadratic bodies need no fit (`organbench advise` names one)",
-    "check": "is now `organbench mesh-check`",
+    "check": "is now `organbench mesh --check FILE`",
     "cost": "is now `organbench profile`",
+    "mesh-check": "is now `organbench mesh --check FILE`",
+    "plot": "is now `organbench report STUDY`",
     "prune": "is gone: delete the folder of a study, and `organbench run` computes it again",
     "restamp": "is gone: `organbench run` computes what another code has made",
+    "status": "is now `organbench show STUDY`",
     "stress": "is now `organbench fuzz`",
     "verify": "is now `python -m studies.lab.verify`, in a clone of the repository",
 }

@@ -68,11 +68,19 @@ def make_folder(folder: Path) -> None:
         ) from error
 
 
-def report(ledger: Ledger, studies: Sequence[Study]) -> tuple[list[Path], list[str]]:
+def report(
+    ledger: Ledger, studies: Sequence[Study], drawn: Sequence[Study] | None = None
+) -> tuple[list[Path], list[str]]:
     """Charts and tables of all studies, the summaries, machine.json, the league where somebody entered it, and
-    report.html, which shows all of it in one page; paths, and what is missing in sentences.
+    report.html, which shows all of it in one page; paths, and what is missing in sentences. drawn: draw these alone,
+    and show the others as they were drawn last.
     """
-    written, remarks = charts_and_tables(ledger, studies)
+    if drawn is None:
+        written, remarks = charts_and_tables(ledger, studies)
+    else:
+        refreshed = [refresh(ledger, study) for study in drawn]
+        written = [path for paths, _ in refreshed for path in paths]
+        remarks = [sentence for _, sentences in refreshed for sentence in sentences]
     league, unread = write_league(ledger.root, with_report=True)
     page, left_out = write_page(ledger.root, studies, league_cards(ledger.root))
     return [*written, *league, *([page] if page else [])], [*remarks, *unread, *left_out]

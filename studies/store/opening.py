@@ -74,7 +74,7 @@ def open_results(path: Path) -> Iterator[h5py.File]:
     if path.suffix == SUFFIX and is_there(path) and not path.is_file():
         raise DamagedFile(f"{path} is not a file: delete it, and run its study again")
     if not is_there(path) or not path.is_file():
-        raise StudyError(f"there is no results file {path}: `organbench status` says which cases are stored")
+        raise StudyError(f"there is no results file {path}: `organbench show` says which cases are stored")
     try:
         check_seal(path)
         with _without_lock(path) as file:

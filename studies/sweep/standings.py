@@ -87,7 +87,7 @@ def causes(job_standings: Sequence[Standing]) -> list[str]:
         more = f", and {len(each) - 1} more" if len(each) > 1 else ""
         sentences.append(f"{status.replace('-', ' ')}: {each[0].message} ({each[0].job.label}{more})")
     left = len(groups) - CAUSES
-    return [*sentences, f"and {left} more causes; `organbench status` names them"] if left > 0 else sentences
+    return [*sentences, f"and {left} more causes; `organbench show` names them"] if left > 0 else sentences
 
 
 def machines_of(job_standings: Iterable[Standing]) -> Counter[str]:

@@ -1,7 +1,6 @@
 """Public names of a package exist, are typed, and load nothing else."""
 
 import ast
-import os
 import pickle
 import subprocess
 import sys
@@ -58,27 +57,14 @@ def test_an_unknown_name_is_an_attribute_error(package):
 HEAVY = ("gmsh", "h5py", "matplotlib", "meshio", "numba", "pandas", "scipy", "skfem", "skimage")
 
 
-@pytest.mark.parametrize(
-    ("words", "loaded"),
-    [
-        (["--help"], ()),
-        (["list"], ()),
-        (["status", "stress"], ("h5py", "numba", "scipy")),
-        (["show", "nothing.h5"], ("h5py",)),
-    ],
-    ids=lambda value: " ".join(value),
-)
-def test_a_command_loads_what_it_needs(words, loaded, tmp_path):
+def test_the_list_of_commands_loads_none_of_them():
     program = (
-        "import sys\nfrom studies.cli import app\n"
-        f"sys.argv = ['organbench', *{words!r}]\n"
+        "import sys\nfrom studies.cli import app\nsys.argv = ['organbench', '--help']\n"
         "try:\n    app.main()\nexcept SystemExit:\n    pass\n"
-        f"print(*(name for name in {HEAVY!r} if name in sys.modules), file=sys.stderr)"
+        f"sys.exit(' '.join(name for name in {HEAVY!r} if name in sys.modules) or 0)"
     )
-    command = [sys.executable, "-c", program]
-    env = {**os.environ, "ORGANBENCH_RESULTS": str(tmp_path)}
-    done = subprocess.run(command, cwd=REPOSITORY, env=env, capture_output=True, text=True, check=True)
-    assert set(done.stderr.splitlines()[-1].split()) <= set(loaded)
+    done = subprocess.run([sys.executable, "-c", program], cwd=REPOSITORY, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr.strip()) == (0, ""), "loading all takes seconds"
 
 
 def test_every_chart_of_the_catalogue_is_listed():

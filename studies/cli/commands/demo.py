@@ -71,7 +71,7 @@ def line(run: Run, words: str) -> str:
     """Volume, force and speed of a run."""
     reference = run.reference
     if reference is None:
-        raise StudyError(f"the scene '{run.case.scene.name}' has no reference: `organbench status demo` says why")
+        raise StudyError(f"the scene '{run.case.scene.name}' has no reference: `organbench show demo` says why")
     uncertainty = 100 * reference.total_uncertainty["force_end"]
     numbers = f"volume {volume_worst(run):.2g} % off, force {force_end(run):+.1f} ± {uncertainty:.1f} %"
     speed = metric("real_time")

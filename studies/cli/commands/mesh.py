@@ -1,5 +1,6 @@
-"""`organbench mesh`: from a name or a file to a mesh."""
+"""`organbench mesh`: from a name or a file to a mesh, and what is wrong with one."""
 
+import json
 import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -11,10 +12,25 @@ import typer
 
 from studies.base.errors import StudyError
 from studies.base.lookup import lookup
-from studies.cli.mesh_files import LongestSide, Part, Scale, Unit, Yes, settled, source_of, working
+from studies.cli import findings
+from studies.cli.mesh_files import (
+    MM,
+    LongestSide,
+    Part,
+    Scale,
+    Unit,
+    Yes,
+    ask_before_large,
+    in_metres,
+    settled,
+    source_of,
+    working,
+)
 from studies.cli.terminal import say
 from studies.geometry import CurvedMesh, OrganMesh, organ, scan, true_shape_of, vary
-from studies.geometry.files.units import NAMES, check_unit
+from studies.geometry.api.advice import with_command
+from studies.geometry.doctor.examine import TISSUE, examine
+from studies.geometry.files.units import NAMES, Source, check_unit
 from studies.geometry.files.writing import SURFACES, VOLUMES, check_target, holds_tetrahedra, write_mesh
 from studies.geometry.mesh.quality import dihedral_angles
 from studies.geometry.organs import SHAPES
@@ -27,7 +43,6 @@ if TYPE_CHECKING:
     from studies.meshing.rest_surface import RestSurface
     from studies.meshing.true_surface import ShapeErrors
 
-MM = 1e-3
 NODES = 550
 
 
@@ -48,9 +63,21 @@ def mesh(
     longest_side: LongestSide = None,
     part: Part = None,
     write_unit: Annotated[str, typer.Option(help="unit of the written lengths: m, cm, mm or in")] = "m",
+    check: Annotated[Path | None, typer.Option(metavar="FILE", help="only list the faults of this mesh")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="as JSON (--check; docs/meshes.md lists the keys)")] = False,
+    modulus: Annotated[float, typer.Option(help="shear modulus \\[Pa], for the time step of --check")] = TISSUE[0],
+    density: Annotated[float, typer.Option(help="density \\[kg/m³], for the time step of --check")] = TISSUE[1],
     yes: Yes = False,
 ) -> None:
-    """Mesh a synthetic organ or a surface in a file, which is welded, oriented, remeshed and filled."""
+    """Mesh a synthetic organ or a surface in a file, which is welded, oriented, remeshed and filled.
+
+    --check FILE lists the faults of a mesh and how to repair each. Exit code 0: none, 1: some, 2: unreadable.
+    """
+    if check is not None:
+        if name or source is not None:
+            raise StudyError("--check FILE makes no mesh; leave out the organ, and --from")
+        ask_before_large(check, yes)
+        examined(source_of(check, unit, scale, longest_side, part), (modulus, density), as_json)
     check_unit(write_unit)
     check_target(output, source)
     filled = check_filling(output, fill, order)
@@ -85,6 +112,20 @@ def mesh(
     say(f"{summary(made)}; written to {output} in {NAMES[write_unit]}")
 
 
+def examined(source: Source, tissue: tuple[float, float], as_json: bool) -> None:
+    """Prints the faults of a file; ends with exit code 1 where it has some."""
+    with working(f"examining {source.path.name}"):
+        report = examine(source, tissue=tissue)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # the file is read again
+            report = with_command(source, report)
+    if as_json:
+        print(json.dumps(report.to_dict(), indent=2, allow_nan=False))
+    else:
+        findings.show(report)
+    raise typer.Exit(0 if report.clean else 1)
+
+
 class Made(NamedTuple):
     """A mesh, and the same with curved sides where an option requests them."""
 
@@ -116,11 +157,6 @@ def check_filling(output: Path, fill: bool | None, order: int) -> bool:
     if order == 2 and not filled:
         raise StudyError("curved elements (--order 2) fill a body; leave out --surface and write .vtu, .vtk or .msh")
     return filled
-
-
-def in_metres(millimetres: float | None) -> float | None:
-    """A length of the command line."""
-    return None if millimetres is None else millimetres * MM
 
 
 def refuse_file_options(given: Mapping[str, object]) -> None:

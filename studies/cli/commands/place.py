@@ -10,7 +10,7 @@ from studies.base.atomic import write_whole
 from studies.base.errors import StudyError
 from studies.base.lookup import lookup
 from studies.catalog.population.folder import placed_scene
-from studies.cli.mesh_files import LongestSide, Part, Scale, Unit, Yes, settled, source_of, working
+from studies.cli.mesh_files import MM, LongestSide, Part, Scale, Unit, Yes, in_metres, settled, source_of, working
 from studies.cli.terminal import say, warn
 from studies.geometry import BallRegion, scan
 from studies.geometry.files.units import Source, stem_of
@@ -26,7 +26,6 @@ from studies.tools.advise.answer import Advice, advise
 from studies.tools.advise.campaign import shipped
 from studies.tools.advise.words import body_in_python
 
-MM = 1e-3
 NODES = 550
 MESHING = 60.0
 """Seconds for the meshes of the same spleen and liver: 26 and 51, and those of the bodies."""
@@ -55,7 +54,7 @@ def place(
     held, probed = (None if text is None else place_of(text) for text in (hold, probe))
     name = tissue_of(tissue, path, part)
     source = settled(source_of(path, unit, scale, longest_side, part), yes)
-    how: dict[str, Any] = {"smooth": smooth * MM, "holes": close_holes, "solid": None if solid is None else solid * MM}
+    how: dict[str, Any] = {"smooth": smooth * MM, "holes": close_holes, "solid": in_metres(solid)}
     with working(f"meshing {path.name}"):
         mesh = scan(source, nodes, fill=False, **how)
     if source.longest_side is None:

@@ -40,7 +40,7 @@ Nothing in here has to be computed again. Unpack it; the folder is a results fol
 
     sha256sum -c {manifest}                    is every file as it was packed?
     organbench archive --check .               the same, by organbench
-    organbench plot {first} --results .        draws the charts and the table again, from the records
+    organbench report {first} --results .        draws the charts and the table again, from the records
     organbench table {first} --results .       a row per case
 
 Without organbench: Python with the packages of constraints.txt (`pip install -r constraints.txt`), and the sources in

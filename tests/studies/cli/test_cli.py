@@ -13,8 +13,8 @@ from typer.testing import CliRunner
 from massspring import METHODS
 from studies.catalog import STUDIES
 from studies.cli import app as cli
-from studies.cli.commands import show as show_command
-from studies.cli.commands.status import SHOWN
+from studies.cli import terminal
+from studies.cli.commands.show import SHOWN
 from studies.geometry.organs import SHAPES
 from studies.metrics.metrics import METRICS
 from studies.metrics.table import study_table
@@ -41,7 +41,7 @@ def test_list_names_everything():
 
 def test_help_comes_without_words():
     result = CliRunner().invoke(cli.app, [])
-    commands = ("list", "run", "status", "show", "table", "plot", "report", "replay", "safe-dt")
+    commands = ("list", "run", "show", "table", "report", "replay", "safe-dt")
     assert all(command in result.output for command in commands)
 
 
@@ -87,7 +87,7 @@ def test_the_index_opens_like_a_tree(organbench, tiny_file, results):
 def test_status_counts_and_says_why(organbench, tiny_file, results):
     path = case_path(results, "tiny", tiny_case())
     write_record(path, replace(read_record(path), fingerprint="0"))
-    code, out, _ = organbench("status", tiny_file, "--results", results)
+    code, out, _ = organbench("show", tiny_file, "--results", results)
     assert code == 0
     first, *why = out.splitlines()
     assert first == "tiny: 3 cases: 1 ok, 1 diverged, 1 stale"
@@ -98,11 +98,11 @@ def test_status_counts_and_says_why(organbench, tiny_file, results):
 
 
 def test_status_names_some_of_many_and_all_with_an_option(organbench, tmp_path):
-    code, out, _ = organbench("status", "volume_loss", "--results", tmp_path)
+    code, out, _ = organbench("show", "volume_loss", "--results", tmp_path)
     (rest,) = (int(line.split()[1]) for line in out.splitlines() if "more (--all names them)" in line)
     assert code == 0
     assert len(named(out)) == SHOWN
-    code, out, _ = organbench("status", "volume_loss", "--all", "--results", tmp_path)
+    code, out, _ = organbench("show", "volume_loss", "--all", "--results", tmp_path)
     assert len(named(out)) == SHOWN + rest
     assert "ball_squeeze-surface-550-free-dt0.5" in out
 
@@ -112,7 +112,7 @@ def named(out) -> list[str]:
 
 
 def test_status_of_everything(organbench, tmp_path):
-    code, out, _ = organbench("status", "--results", tmp_path)
+    code, out, _ = organbench("show", "--results", tmp_path)
     assert code == 0
     counts, references = out.split("references:\n")
     assert [line.split(":")[0] for line in counts.splitlines()] == [study.name for study in STUDIES]
@@ -138,7 +138,7 @@ def test_show_tells_units_status_and_numbers(organbench, results):
 
 
 def test_show_goes_on_below_where_the_terminal_is_narrow(organbench, results, monkeypatch):
-    monkeypatch.setattr(show_command.console, "_width", 40)
+    monkeypatch.setattr(terminal.console, "_width", 40)
     path = case_path(results, "tiny", tiny_case())
     shown = "".join(organbench("show", path)[1].split())
     assert path.name in shown
@@ -185,9 +185,10 @@ def test_table_of_chosen_metrics(organbench, tiny_file, results):
     assert "worst" not in out
 
 
-def test_plot_names_what_it_drew(organbench, tiny_file, results):
-    code, out, _ = organbench("plot", tiny_file, "--results", results)
-    assert (code, out.split()) == (0, [str(results / "tiny" / name) for name in ("picture.txt", "tiny.csv")])
+def test_report_names_what_it_drew(organbench, tiny_file, results):
+    code, out, _ = organbench("report", tiny_file, "--results", results)
+    names = ("tiny/picture.txt", "tiny/tiny.csv", "report.html")
+    assert (code, out.split()) == (0, [str(results / name) for name in names])
     assert (results / "tiny" / "picture.txt").read_text() == "3 runs"
 
 

@@ -29,13 +29,13 @@ REPOSITORY = Path(__file__).parents[3]
         (("run", "volume_los"), "unknown study 'volume_los'; did you mean 'volume_loss'"),
         (("run", "volume_loss", "frame_rat"), "unknown study 'frame_rat'; did you mean 'frame_rate'"),
         (("run", "volume_loss", "--only", "failing"), "unknown filter 'failing'; did you mean 'failed'"),
-        (("status", "stabilty_map"), "did you mean 'stability_map'"),
+        (("show", "stabilty_map"), "did you mean 'stability_map'"),
         (("table", "work-precision"), "did you mean 'work_precision'"),
         (
             ("table", "volume_loss", "--metrics", "volume_wurst"),
             "unknown metric 'volume_wurst'; did you mean 'volume_worst'",
         ),
-        (("plot", "frames"), "unknown study 'frames'"),
+        (("report", "frames"), "unknown study 'frames'"),
         (("safe-dt", "bal_squeeze"), "unknown scene 'bal_squeeze'; did you mean 'ball_squeeze'"),
         (
             ("safe-dt", "ball_squeeze", "--method", "implicit_vol"),
@@ -52,7 +52,7 @@ REPOSITORY = Path(__file__).parents[3]
         (("mesh", "ball", "--order", "3"), "`organbench mesh --help` lists the options"),
         (("list", "--kind"), "no such option: --kind"),
         (("list", "scene"), "unknown kind of name 'scene'; did you mean 'scenes'"),
-        (("stauts",), "unknown command 'stauts'; did you mean 'status'"),
+        (("tabel",), "unknown command 'tabel'; did you mean 'table'"),
         (("table",), "missing argument 'study'; `organbench table --help` lists the options"),
         (("table", "volume_loss"), "nothing of volume_loss is stored in"),
     ],
@@ -90,13 +90,13 @@ def test_a_traceback_that_cannot_be_written_is_printed(organbench, monkeypatch, 
 
 def test_a_file_in_the_place_of_the_results_folder(refused, tmp_path):
     (tmp_path / "afile").write_text("")
-    for words in (("status",), ("table", "volume_loss"), ("plot", "volume_loss"), ("advise", "ball_squeeze")):
+    for words in (("show",), ("table", "volume_loss"), ("report", "volume_loss"), ("advise", "ball_squeeze")):
         assert "is a file" in refused(*words, "--results", tmp_path / "afile")
     assert "is a file" in refused("run", "volume_loss", "--dry-run", "--results", os.devnull)
 
 
 def test_status_of_a_folder_that_is_missing(refused, tmp_path):
-    assert f"there is no folder {tmp_path / 'none'}" in refused("status", "--results", tmp_path / "none")
+    assert f"there is no folder {tmp_path / 'none'}" in refused("show", "--results", tmp_path / "none")
 
 
 def test_the_table_of_a_study_of_which_nothing_is_stored_is_not_written(refused, tmp_path):
@@ -105,7 +105,7 @@ def test_the_table_of_a_study_of_which_nothing_is_stored_is_not_written(refused,
 
 
 def test_a_study_of_which_nothing_is_stored_is_not_drawn(refused, tmp_path):
-    sentence = refused("plot", "volume_loss", "--results", tmp_path / "none")
+    sentence = refused("report", "volume_loss", "--results", tmp_path / "none")
     assert "nothing of volume_loss is stored" in sentence and "run `organbench run volume_loss` first" in sentence
     assert not (tmp_path / "none").exists()
 
@@ -137,7 +137,7 @@ def test_a_folder_that_may_not_be_entered(refused, tiny_file, results, monkeypat
         return real_stat(path, *words, **more)
 
     monkeypatch.setattr(os, "stat", stat)
-    for command in ("status", "run", "table"):
+    for command in ("show", "run", "table"):
         assert "cannot be looked at (Permission denied): change the permissions of its folder" in refused(
             command, tiny_file, "--results", results
         )
@@ -191,7 +191,7 @@ def test_bad_meshes_fail_and_the_study_goes_on(organbench, tmp_path):
     assert [record.status for record in records] == [Status.OK, Status.FAILED, Status.OK, Status.FAILED]
     assert "open.obj: the surface is open" in records[1].message
     assert "missing.obj" in records[3].message
-    code, out, _ = organbench("status", file, "--results", results)
+    code, out, _ = organbench("show", file, "--results", results)
     assert "2 ok, 2 failed" in out or "2 failed, 2 ok" in out
 
 

@@ -81,7 +81,7 @@ def test_a_scene_alone_is_a_study_of_four_bodies_with_charts(write):
 
 
 @pytest.mark.parametrize(
-    "words", [("run", "--dry-run"), ("status",), ("advise", "--no-timing"), ("safe-dt", "--nodes", 60)]
+    "words", [("run", "--dry-run"), ("show",), ("advise", "--no-timing"), ("safe-dt", "--nodes", 60)]
 )
 def test_both_kinds_of_file_are_taken(organbench, write, tmp_path, monkeypatch, words):
     monkeypatch.setenv("ORGANBENCH_RESULTS", str(tmp_path))
@@ -145,7 +145,7 @@ def test_stored_cases_of_a_file_are_viewed_and_archived(organbench, write, tmp_p
     code, out, err = organbench("archive", "mine.py", "-o", "all.zip")
     assert code == 0, err
     with zipfile.ZipFile("all.zip") as packed:
-        assert "organbench plot mine.py --results ." in packed.read("README.md").decode()
+        assert "organbench report mine.py --results ." in packed.read("README.md").decode()
         assert "mine.py" in packed.namelist()
 
 
@@ -164,8 +164,8 @@ def test_a_case_is_named_by_a_part_of_its_name(organbench, refused, write, tmp_p
 def test_status_knows_smoke_runs(organbench, write, tmp_path):
     path, results = write("STUDY = tiny_study(cases=(tiny_case(),))\n"), tmp_path / "results"
     assert organbench("run", path, "--smoke", "--results", results, "--jobs", 1)[0] == 0
-    assert organbench("status", path, "--results", results, "--smoke")[1].startswith("tiny: 1 case: 1 ok\n")
-    assert "tiny: 1 case: 1 missing" in organbench("status", path, "--results", results)[1]
+    assert organbench("show", path, "--results", results, "--smoke")[1].startswith("tiny: 1 case: 1 ok\n")
+    assert "tiny: 1 case: 1 missing" in organbench("show", path, "--results", results)[1]
 
 
 def test_a_study_that_the_page_cannot_show_is_named(organbench, write, tmp_path, monkeypatch):

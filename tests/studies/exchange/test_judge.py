@@ -133,11 +133,11 @@ def test_tables_and_charts_show_an_entry_and_ours(organbench, ours, reference, r
     code, out, err = organbench("table", study, "--results", results)
     (row,) = [line for line in out.splitlines() if "theirs" in line]
     assert "force" in out and row.split()[-1] == "4"  # simulated seconds per second
-    organbench("plot", study, "--results", results)
+    organbench("report", study, "--results", results)
     assert "theirs" in (results / "mine" / "mine.csv").read_text()
     front = (results / "mine" / "front.png").read_bytes()
     organbench("judge", scene_file, path, *options[:-1], 2.5)
-    organbench("plot", study, "--results", results)
+    organbench("report", study, "--results", results)
     assert (results / "mine" / "front.png").read_bytes() != front  # drawn again: it has become slower
     runs, problems = entries_beside(results, [SCENE], lambda scene: None)
     assert [run.case.method.name for run in runs] == ["theirs"] and not problems

@@ -54,7 +54,7 @@ def ran(organbench, mine, folder):
 
 
 def test_it_runs_and_is_current_and_its_records_name_the_file(organbench, mine, ran):
-    _, out, err = organbench("status", mine, "--results", ran)
+    _, out, err = organbench("show", mine, "--results", ran)
     assert out.startswith("calm: 3 cases: 3 ok\n") and not err
     study = find_study(str(mine))
     records = [read_record(case_path(ran, "calm", case)) for case in study.cases]
@@ -88,7 +88,7 @@ EDITS = {
 def test_an_edit_makes_stale_what_uses_the_file(organbench, mine, ran, what):
     before, after, counts = EDITS[what]
     edit(mine, before, after)
-    assert organbench("status", mine, "--results", ran)[1].startswith(f"calm: 3 cases: {counts}\n")
+    assert organbench("show", mine, "--results", ran)[1].startswith(f"calm: 3 cases: {counts}\n")
 
 
 def test_an_edit_of_a_module_beside_it_does_too(mine):
@@ -105,7 +105,7 @@ def test_a_new_chart_or_metric_is_drawn_without_running(organbench, mine, ran):
     edit(mine, "figure.savefig(path)", 'path.write_text("no picture")')
     path = case_path(ran, "calm", find_study(str(mine)).cases[0])
     before = path.stat().st_mtime_ns
-    organbench("plot", mine, "--results", ran)
+    organbench("report", mine, "--results", ran)
     assert (ran / "calm" / "force.png").read_text() == "no picture"
     assert "force_mean [kN]" in (ran / "calm" / "calm.csv").read_text()
     assert path.stat().st_mtime_ns == before

@@ -32,7 +32,7 @@ def dangling(path):
 @pytest.mark.parametrize("what", [link_to_itself, two_links_in_a_circle, dangling])
 def test_a_link_that_leads_nowhere_is_a_missing_case_and_replaced(organbench, tiny_file, results, place, what):
     what(place)
-    code, out, err = organbench("status", tiny_file, "--results", results)
+    code, out, err = organbench("show", tiny_file, "--results", results)
     assert code == 0 and not err and "1 missing" in out
     assert "free" in organbench("table", tiny_file, "--results", results)[1]
     assert "there is no results file" in organbench("show", place)[2]
@@ -43,7 +43,7 @@ def test_a_link_that_leads_nowhere_is_a_missing_case_and_replaced(organbench, ti
 @pytest.mark.parametrize("make", [os.mkdir, os.mkfifo])
 def test_what_is_no_file_costs_its_case_alone(organbench, tiny_file, results, place, make):
     make(place)
-    code, out, err = organbench("status", tiny_file, "--results", results)
+    code, out, err = organbench("show", tiny_file, "--results", results)
     assert code == 0 and "1 stale" in out and "2 ok" not in out
     code, out, err = organbench("table", tiny_file, "--results", results)
     assert code == 0 and "free" in out

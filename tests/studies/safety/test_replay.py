@@ -73,7 +73,7 @@ def test_no_other_command_runs_it(organbench, results, evil, tmp_path, tiny_file
     file, sha256 = evil
     record = record_that_names(results, json.dumps({str(file): sha256}))
     monkeypatch.chdir(tmp_path)
-    for words in (("show", record, "--all"), ("status", tiny_file), ("table", tiny_file), ("plot", tiny_file)):
-        more = () if words[0] == "show" else ("--results", results)
+    for words in (("show", record, "--all"), ("show", tiny_file), ("table", tiny_file), ("report", tiny_file)):
+        more = () if "--all" in words else ("--results", results)
         assert organbench(*words, *more)[0] == 0
     assert not (tmp_path / "marker").exists()

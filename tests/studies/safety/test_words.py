@@ -9,7 +9,7 @@ from studies.cli.terminal import PROGRAM
 ROOT = Path(__file__).parents[3]
 
 
-@pytest.mark.parametrize("command", ["run", "table", "plot"])
+@pytest.mark.parametrize("command", ["run", "table", "show", "report"])
 def test_the_help_of_a_command_that_runs_a_file_says_so(organbench, monkeypatch, command):
     monkeypatch.setenv("COLUMNS", "400")
     code, out, _ = organbench(command, "--help")

@@ -211,12 +211,12 @@ def test_status_check_reads_every_byte(organbench, many):
     study = many / "many.py"
     study.write_text("from tests.studies.store.test_ledger import STUDY\n")
     path = record_files(many, NAME)[0]
-    assert organbench("status", study, "--results", many)[1].startswith(f"many: {COUNT} cases: {COUNT} ok\n")
+    assert organbench("show", study, "--results", many)[1].startswith(f"many: {COUNT} cases: {COUNT} ok\n")
     lose_silently(many, path)
-    assert organbench("status", study, "--results", many)[1].startswith(f"many: {COUNT} cases: {COUNT} ok\n")
-    code, out, _ = organbench("status", study, "--check", "--results", many)
+    assert organbench("show", study, "--results", many)[1].startswith(f"many: {COUNT} cases: {COUNT} ok\n")
+    code, out, _ = organbench("show", study, "--check", "--results", many)
     assert code == 0 and out.startswith(f"many: {COUNT} cases: {COUNT - 1} ok, 1 stale\n  stale: {DAMAGED}\n")
-    assert f"{COUNT - 1} ok, 1 stale" in organbench("status", study, "--results", many)[1]
+    assert f"{COUNT - 1} ok, 1 stale" in organbench("show", study, "--results", many)[1]
 
 
 def test_the_first_reader_marks_lost_bits_for_all(many):

@@ -6,7 +6,7 @@ import pytest
 from rich.console import Console
 
 from studies.base.errors import StudyError
-from studies.cli.commands.show import describe
+from studies.cli.record_text import describe
 from studies.store import links
 from studies.store.ledger import Ledger
 from studies.store.links import link_study
@@ -118,7 +118,7 @@ def test_an_unreadable_case_is_reported_and_left_out(tmp_path):
 
 def test_show_tells_status_units_and_numbers(tmp_path):
     path = store(tmp_path, "ball/free", '{"a": 1}', Status.DIVERGED, "at t = 0.2 s [m]")
-    text = shown(describe(path))
+    text = shown(describe(path, every=True))
     for part in (
         "ball/free",
         "diverged: at t = 0.2 s [m]",
@@ -129,18 +129,6 @@ def test_show_tells_status_units_and_numbers(tmp_path):
         "not finite: 1 of ",
     ):
         assert part in text, part
-
-
-def test_show_an_index(tmp_path):
-    store(tmp_path, "ball/free", '{"a": 1}')
-    gone = store(tmp_path, "ball/implicit", '{"a": 2}', Status.TIMED_OUT, "after 60 s")
-    link_study(Ledger(tmp_path), "volume_loss")
-    text = shown(describe(index_path(tmp_path, "volume_loss")))
-    assert "index of 2 cases" in text
-    assert "free  status ok" in text
-    assert "implicit  status timed-out: after 60 s" in text
-    gone.unlink()
-    assert "there is no results file" in shown(describe(index_path(tmp_path, "volume_loss")))
 
 
 def test_an_index_is_no_record(tmp_path):

@@ -119,7 +119,7 @@ def test_a_case_that_ends_its_process_is_stored_and_the_rest_goes_on(organbench,
     (sentence,) = [line for line in err.splitlines() if SHAPE not in line]
     assert sentence.startswith("warning: failed: tiny_squeeze-tetrahedral-60-fatal-dt0.5 (its process died 3")
     assert sentence.endswith(f"all others are done, `organbench run {file} --only failed` retries")
-    assert organbench("status", file, "--results", results)[1].splitlines()[0] == "tiny: 2 cases: 1 ok, 1 failed"
+    assert organbench("show", file, "--results", results)[1].splitlines()[0] == "tiny: 2 cases: 1 ok, 1 failed"
     code, out, _ = organbench("run", file, "--results", results)
     assert code == 1 and "tiny: nothing ran" in out, "what failed is known, does not run again, and is not forgotten"
 

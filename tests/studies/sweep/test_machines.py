@@ -22,7 +22,7 @@ def test_status_says_how_many_kinds_of_machines_a_study_mixes(results, tiny_file
     assert mixture(machines_of(standings(Ledger(results), study))) is None, "all are of this one"
     here = stored_by(results, study.cases[0], machine="00000000")
     assert machines_of(standings(Ledger(results), study)) == {here: 2, "00000000": 1}
-    shown = organbench("status", tiny_file, "--results", results)[1]
+    shown = organbench("show", tiny_file, "--results", results)[1]
     sentence = (
         f"made on 2 kinds of processors, whose results differ by rounding: 2 of machine {here}, 1 of machine 00000000"
     )

@@ -1,4 +1,4 @@
-"""`organbench mesh-check` tries its advice: the command makes a clean body, or the output lists what was tried."""
+"""`organbench mesh --check` tries its advice: the command makes a clean body, or the output lists what was tried."""
 
 import json
 import shlex
@@ -55,25 +55,25 @@ def test_the_command_that_is_printed_works(organbench, tmp_path, monkeypatch, fa
     points, faces, options = damaged()[fault]
     monkeypatch.chdir(tmp_path)
     stored(tmp_path / "my scan.ply", points, faces)
-    code, out, _ = organbench("mesh-check", "my scan.ply", "--unit", "mm")
+    code, out, _ = organbench("mesh", "--check", "my scan.ply", "--unit", "mm")
     assert code == 1 and TRIED in out
     words = shlex.split(out.splitlines()[-1])
     assert words[:4] == ["organbench", "mesh", "--from", "my scan.ply"] and set(options) <= set(words)
     advised = [line for line in out.splitlines() if line.startswith("   -> ")]
     assert advised and not any(line.startswith("   -> try") for line in advised)
     assert organbench(*words[1:])[0] == 0
-    code, out, _ = organbench("mesh-check", "my scan_body.vtu")
+    code, out, _ = organbench("mesh", "--check", "my scan_body.vtu")
     assert code == 0, out
 
 
 def test_advice_that_does_not_work_is_not_printed(organbench, tmp_path):
     """No option makes a body of an open triangle, or of a bowl with a double wall."""
     path = stored(tmp_path / "one.ply", 100 * np.eye(3), [[0, 1, 2]])
-    code, out, _ = organbench("mesh-check", path, "--unit", "mm")
+    code, out, _ = organbench("mesh", "--check", path, "--unit", "mm")
     assert code == 1 and TRIED not in out and "-> try" not in out and "FILE" not in out
     assert "tried: --nodes 550 --close-holes; --nodes 550 --smooth 3 --close-holes; --nodes 550 --solid 5; none" in out
     assert "the widest is 141 mm wide, at (33.33, 33.33, 33.33) mm" in out
-    assert json.loads(organbench("mesh-check", path, "--unit", "mm", "--json")[1])["command"] is None
+    assert json.loads(organbench("mesh", "--check", path, "--unit", "mm", "--json")[1])["command"] is None
 
 
 def test_what_no_option_repairs_and_what_is_large_is_not_tried(tmp_path, monkeypatch):
@@ -110,7 +110,7 @@ def test_a_real_organ_with_a_hole_and_turned_triangles(organbench, tmp_path, mon
     faces[:200] = faces[:200, ::-1]
     monkeypatch.chdir(tmp_path)
     stored(tmp_path / "spleen.ply", raw.points, faces[5:])
-    code, out, _ = organbench("mesh-check", "spleen.ply")
+    code, out, _ = organbench("mesh", "--check", "spleen.ply")
     assert code == 1 and TRIED in out
     assert organbench(*shlex.split(out.splitlines()[-1])[1:])[0] == 0
 
@@ -142,7 +142,7 @@ def test_what_is_no_organ_is_a_finding_and_a_refusal(organbench, tmp_path, monke
         ("small_liver.ply", "encloses 0.49 mL, and no organ is smaller than 1 mL"),
         ("far_liver.vtu", "it lies 1e+06 m from the origin of its coordinates"),
     ):
-        code, out, _ = organbench("mesh-check", name, "--unit", "mm")
+        code, out, _ = organbench("mesh", "--check", name, "--unit", "mm")
         assert code == 1 and message in out and TRIED not in out
         for words in (("mesh", "--from", name, "--nodes", 200), ("mesh", "--from", name), ("place", name)):
             code, _, err = organbench(*words, "--unit", "mm")
@@ -154,7 +154,7 @@ def test_grey_values_are_refused_by_all_three(organbench, tmp_path, monkeypatch)
     monkeypatch.chdir(tmp_path)
     grey = np.random.default_rng(0).integers(0, 239, (30, 30, 30)).astype(np.int16)
     nibabel.save(nibabel.Nifti1Image(grey, np.eye(4)), "liver_ct.nii.gz")
-    for words in (("mesh-check",), ("mesh", "--nodes", 200, "--from"), ("place",)):
+    for words in (("mesh", "--check"), ("mesh", "--nodes", 200, "--from"), ("place",)):
         code, out, err = organbench(*words, "liver_ct.nii.gz", "--part", "204")
         assert code == 2 and not out and "grey values" in err and "not a mask: segment it first" in err
 
@@ -166,6 +166,6 @@ def test_a_mask_has_a_plain_file_name_and_is_in_millimetres(organbench, tmp_path
     ball = (sum(axis**2 for axis in axes) < 20**2).astype(np.uint8)
     ball[1:4, 1:4, 1:4] = 1
     nibabel.save(nibabel.Nifti1Image(ball, np.eye(4)), "spleen_mask.nii.gz")
-    code, out, err = organbench("mesh-check", "spleen_mask.nii.gz")
+    code, out, err = organbench("mesh", "--check", "spleen_mask.nii.gz")
     assert code == 1 and out.rstrip().endswith("-o spleen_mask_body.vtu")
     assert err.count("its header does not say the unit; assuming millimetres") == 1

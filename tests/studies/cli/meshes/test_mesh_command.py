@@ -1,4 +1,4 @@
-"""`organbench mesh` and `organbench mesh-check`: files in, files out, one sentence for bad input."""
+"""`organbench mesh` and `organbench mesh --check`: files in, files out, one sentence for bad input."""
 
 import json
 import os
@@ -83,7 +83,7 @@ def test_an_organ_is_meshed_without_faults(organbench, tmp_path):
     assert out.strip().endswith(f"written to {target} in metres")
     made = read_mesh(target)
     assert made.surface_count == 200 and "hilum" in made.patches
-    code, out, _ = organbench("mesh-check", target)
+    code, out, _ = organbench("mesh", "--check", target)
     assert code == 0 and "no faults found" in out
     # Of the kidney with this seed.
     volume, usual = (true_volume(make_shape("kidney", given)) for given in (vary("kidney", 3), {}))
@@ -99,7 +99,7 @@ def test_a_file_is_mended_remeshed_and_filled(organbench, tmp_path):
     assert "scan.stl: 1 of 2 separate parts are left out" in err and "inverted and has been flipped" in err
     made = read_mesh(target)
     assert made.volume == pytest.approx(1e-9 * signed_volume(POINTS, FACES), rel=1e-3)
-    assert organbench("mesh-check", target)[0] == 0
+    assert organbench("mesh", "--check", target)[0] == 0
     # What was lost is printed, and stored in the mesh.
     assert "file to mesh: mean 0." in out and "mesh to file: mean 0." in out and "% of the diagonal) at (" in out
     assert re.search(r"volume: file (\S+) mL, mesh \1 mL \([+-]0\.00", out)
@@ -143,17 +143,17 @@ def test_a_scan_can_be_curved(organbench, egg, tmp_path):
 
 def test_findings_and_their_exit_code(organbench, tmp_path):
     path = stored(tmp_path / "open.ply", 1e-3 * POINTS, FACES[3:])
-    code, out, err = organbench("mesh-check", path)
+    code, out, err = organbench("mesh", "--check", path)
     assert (code, err) == (1, "")
     assert "so it has no inside and no volume" in out
     assert "-> organbench mesh --from FILE --close-holes" in out
-    code, out, _ = organbench("mesh-check", path, "--json")
+    code, out, _ = organbench("mesh", "--check", path, "--json")
     report = json.loads(out)
     assert code == 1 and not report["clean"] and report["findings"][0]["code"] == "open"
     assert report["measures"]["open_edges"] == report["findings"][0]["count"] > 0
     closed = tmp_path / "closed.ply"
     assert organbench("mesh", "--from", path, "--close-holes", "-o", closed)[0] == 0
-    assert organbench("mesh-check", closed)[0] == 0
+    assert organbench("mesh", "--check", closed)[0] == 0
 
 
 def wrong_options(folder):
@@ -180,7 +180,7 @@ def wrong_options(folder):
         "no nodes": (("mesh", "ball", "--nodes", 0, *out), "0 surface nodes asked for"),
         "few nodes of an organ": (("mesh", "liver", "--nodes", 20, *out), "20 surface nodes asked for"),
         "folder": (("mesh", "ball", "--nodes", 150, "-o", folder / "egg.ply" / "out.vtu"), "was not written"),
-        "missing": (("mesh-check", folder / "none.ply"), "there is no mesh file"),
+        "missing": (("mesh", "--check", folder / "none.ply"), "there is no mesh file"),
     }
 
 
@@ -207,11 +207,11 @@ def no_mesh(folder):
         "open kept": (("mesh", "--from", torn, "--unit", "mm", *out), "the surface is open"),
         "one triangle": (("mesh", "--from", single, "--unit", "mm", *out), "the surface is open"),
         "text": (("mesh", "--from", text, "--unit", "mm", *out), "notes.stl"),
-        "text checked": (("mesh-check", text), "notes.stl"),
+        "text checked": (("mesh", "--check", text), "notes.stl"),
         "cut": (("mesh", "--from", cut, "--unit", "mm", *out), "cut.stl is cut short"),
-        "cut checked": (("mesh-check", cut), "cut.stl is cut short"),
+        "cut checked": (("mesh", "--check", cut), "cut.stl is cut short"),
         "huge": (("mesh", "--from", huge, "--unit", "mm", *out), "about 10,000,000 triangles (500 MB)"),
-        "huge checked": (("mesh-check", huge), "say --yes to go on"),
+        "huge checked": (("mesh", "--check", huge), "say --yes to go on"),
     }
 
 
@@ -239,9 +239,9 @@ def test_on_a_terminal_it_asks_for_the_unit_and_before_large_files(organbench, e
     assert np.ptp(read_mesh(target).points[:, 0]) == pytest.approx(0.06, rel=1e-6)
     monkeypatch.setattr(commands, "size_warning", lambda path: "it is large")
     monkeypatch.setattr(commands.typer, "confirm", lambda question: question != "it is large. Go on?")
-    code, out, err = organbench("mesh-check", egg, "--unit", "mm")
+    code, out, err = organbench("mesh", "--check", egg, "--unit", "mm")
     assert (code, out) == (2, "") and err.startswith("organbench: it is large; say --yes")
-    code, _, err = organbench("mesh-check", egg, "--unit", "mm", "--yes")
+    code, _, err = organbench("mesh", "--check", egg, "--unit", "mm", "--yes")
     assert code == 0 and "warning: it is large" in err
 
 

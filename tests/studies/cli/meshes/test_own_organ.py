@@ -24,7 +24,7 @@ from tests.studies.page.unpack import unpack_frames
 
 PAGE = Path(__file__).parents[4] / "docs" / "own-organ.md"
 COMMANDS = re.findall(r"^    organbench (.+)$", PAGE.read_text(encoding="utf-8"), re.MULTILINE)
-CODES = {"mesh-check scan.ply": 1}
+CODES = {"mesh --check scan.ply": 1}
 """Exit codes other than 0."""
 KIDNEY = 0.105
 """Its length [m]."""
@@ -65,7 +65,7 @@ def test_the_page_is_followed(organbench, scan_file, kidney, whole):
     """Up to what the run would be, and to its report."""
     folder = scan_file.parent
     scene_file = folder / "my_scene.py"
-    words = ["mesh-check", "mesh", "mesh-check", "place", "run", "run", "status", "table", "report"]
+    words = ["mesh", "mesh", "mesh", "place", "run", "run", "show", "table", "report"]
     assert [line.split()[0] for line in COMMANDS] == words
     for line in COMMANDS if whole else COMMANDS[: words.index("run") + 1]:
         if line == "run my_scene.py":

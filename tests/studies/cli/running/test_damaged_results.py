@@ -77,6 +77,6 @@ def test_one_damaged_file_costs_one_case(organbench, tiny_file, results, fault):
     assert code == 0 and path.name in err and len(err.splitlines()) == 1
     rows = [line for line in out.splitlines() if line.startswith(("  free ", "  implicit_volume "))]
     assert len(rows) == (3 if fault == "the timing" else 2)
-    code, out, _ = organbench("status", tiny_file, "--results", results)
+    code, out, _ = organbench("show", tiny_file, "--results", results)
     assert code == 0 and (fault == "the timing" or {"1 ok", "1 stale"} < set(re.findall(r"\d \w+", out)))
     assert ("its file is damaged" in out) == (fault != "the timing")

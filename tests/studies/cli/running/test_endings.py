@@ -85,7 +85,7 @@ def test_a_reference_that_failed_is_exit_code_1(organbench, tmp_path, file_of, l
 def test_status_and_run_count_alike(organbench, results, file_of):
     path = file_of(FILE.format(""))
     by_run = organbench("run", path, "--results", results)[1].splitlines()[-1]
-    assert organbench("status", path, "--results", results)[1].splitlines()[0] == by_run
+    assert organbench("show", path, "--results", results)[1].splitlines()[0] == by_run
 
 
 def standing(status, message, number=0) -> Standing:

@@ -134,7 +134,7 @@ def test_a_study_file_that_is_wrong(refused, tmp_path, fault):
     text, message = BROKEN[fault]
     path = tmp_path / "mine.py"
     path.write_text(text)
-    for command in ("run", "table", "status"):
+    for command in ("run", "table", "show"):
         assert message in refused(command, path, "--results", tmp_path / "results")
     assert not (tmp_path / "results").exists()
 
@@ -144,7 +144,7 @@ def test_a_chart_that_fails_is_a_sentence_after_all_else_is_done(refused, result
     path = tmp_path / "mine.py"
     other = "Chart('b.txt', lambda r, p: p.write_text('drawn'))"
     path.write_text(OWN + f"STUDY = tiny_study(charts=(Chart('a.png', {draw}), {other}))\n")
-    assert CHARTS[draw] in refused("plot", path, "--results", results)
+    assert CHARTS[draw] in refused("report", path, "--results", results)
     assert (results / "tiny" / "b.txt").read_text() == "drawn"
     assert (results / "tiny" / "tiny.csv").exists()
 

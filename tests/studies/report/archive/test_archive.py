@@ -66,7 +66,7 @@ def test_the_code_in_it_draws_by_itself(unpacked, tmp_path):
     file.write_text(STUDY_FILE)
     env = {**os.environ, "PYTHONPATH": str(unpacked / "code")}
     program = "import studies.__main__ as m; assert 'unpacked' in m.__file__, m.__file__; m.main()"
-    command = [sys.executable, "-c", program, "plot", str(file), "--results", str(unpacked)]
+    command = [sys.executable, "-c", program, "report", str(file), "--results", str(unpacked)]
     subprocess.run(command, cwd=tmp_path, env=env, check=True, capture_output=True)
     assert table.read_bytes() == before
 
