@@ -7,7 +7,7 @@ PYTEST := PYTHONDONTWRITEBYTECODE= OMP_NUM_THREADS=1 $(BIN)/python -m pytest -q 
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help demo study study-league report publish publish-plan verify smoke test check lint docs links figures fuzz stress bench speeds \
+.PHONY: help demo study study-league report publish draw verify smoke test check lint docs links figures fuzz stress bench speeds \
 	coverage clean distclean compiled \
 	compiled-essential setup-run \
 	setup-test setup-verify setup-dev FORCE
@@ -34,11 +34,22 @@ study-league: setup-run ## all programs and ours on the open scenes of the leagu
 	$(BIN)/python -m studies.exchange.peers.main
 	$(BIN)/organbench report
 
-publish: setup-run compiled ## all that is published, again, by this commit on this machine (hours; goes on where it was interrupted)
-	$(BIN)/python -m studies.report.release
+# What is current is skipped; so the same command goes on where it was interrupted.
+publish: setup-verify compiled ## all that is published, again, by this machine (half a day; goes on where it was interrupted)
+	$(BIN)/organbench run $$($(BIN)/python -c "import studies; print(*(study.name for study in studies.STUDIES))")
+	$(BIN)/organbench run population
+	$(BIN)/python -m studies.lab.verify
+	$(BIN)/organbench report --figures
+	$(BIN)/python -m studies.tools.silicone.main
+	$(MAKE) fuzz
+	$(BIN)/python -m studies.exchange.peers.main --sweep
+	$(BIN)/python -m studies.exchange.peers.main
+	$(BIN)/python -m studies.lab.publish
+	$(BIN)/python -m studies.report.methods_page
+	$(BIN)/python -m studies.cli.commands_page
 
-publish-plan: setup-run ## what `make publish` would do, and how long it takes
-	$(BIN)/python -m studies.report.release --dry-run
+draw: setup-run ## ten published rows, drawn at random, run again and compared (minutes; SEED=7 repeats a draw)
+	$(BIN)/python -m studies.lab.publish.draw $(if $(SEED),--seed $(SEED))
 
 verify: setup-verify docs ## before a release: oracles, campaigns, browsers, clusters, wheels, notebooks (half an hour)
 	$(BIN)/python -m studies.lab.verify

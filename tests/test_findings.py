@@ -15,14 +15,13 @@ from studies.catalog.accuracy import ACCURACY
 from studies.geometry.organs import make_shape
 from studies.geometry.surface.first_surface import true_volume
 from studies.reference.solve import VARIANTS
-from studies.report.publish import PUBLISHED
 from studies.report.sentences import APART, NODAL, SENTENCES, TOGETHER, random_organs, real_time
 from studies.report.summaries import SUMMARIES
 from studies.scene.library import BALL_SQUEEZE, LIVER_PRESS
 from studies.scene.library.ball_squeeze import RADIUS
 
 ROOT = Path(__file__).parent.parent
-TABLES = ROOT / PUBLISHED
+TABLES = ROOT / "results/published"
 HEADLINE = SENTENCES[0]
 
 
@@ -53,7 +52,7 @@ def page(name: str) -> str:
 
 @pytest.mark.parametrize("sentences", SENTENCES, ids=lambda sentences: sentences.name)
 def test_findings_in_words_are_read_off_the_published_tables(sentences):
-    assert between(sentences.page, sentences.marks) == sentences.written(TABLES), "run `organbench publish`"
+    assert between(sentences.page, sentences.marks) == sentences.written(TABLES)
 
 
 @pytest.mark.parametrize("summary", SUMMARIES, ids=lambda summary: summary.name)
@@ -122,7 +121,7 @@ def test_other_programs_are_judged_on_every_scene_and_not_on_that_of_the_search_
 
 def test_a_missing_table_is_one_sentence(published):
     (published / "league" / "league.csv").unlink()
-    with pytest.raises(StudyError, match=r"there is no table .*league.csv .*`organbench publish league` writes it"):
+    with pytest.raises(StudyError, match=r"there is no table .*league.csv .*`make publish` writes it"):
         HEADLINE.written(published)
 
 

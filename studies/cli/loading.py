@@ -40,7 +40,6 @@ GROUPS = {
         "export": "Write a scene for another program.",
         "judge": "Judge the results of another program like our own.",
         "archive": "Pack records, tables, charts and code into a zip file.",
-        "publish": "Copy tables and charts to results/published.",
         "doctor": "Check this installation, its caches and its results.",
     },
 }
@@ -53,6 +52,7 @@ FORMER = {
     "mesh-check": "is now `organbench mesh --check FILE`",
     "plot": "is now `organbench report STUDY`",
     "prune": "is gone: delete the folder of a study, and `organbench run` computes it again",
+    "publish": "is gone: `python -m studies.lab.publish` in a clone does it",
     "restamp": "is gone: `organbench run` computes what another code has made",
     "status": "is now `organbench show STUDY`",
     "stress": "is now `organbench fuzz`",

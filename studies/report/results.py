@@ -26,7 +26,6 @@ from studies.store.archived import is_archive, shown_machine
 from studies.store.ledger import Ledger
 from studies.store.machine import write_machine
 from studies.store.paths import study_folder
-from studies.store.stamps import set_stamp
 from studies.store.tables import write_table
 from studies.sweep.job import case_jobs, reference_jobs
 from studies.sweep.load import References, load_runs
@@ -202,7 +201,6 @@ def draw_figures(root: Path) -> list[Path]:
     draw_organs({name: organ(name, FIGURE_NODES) for name in SHAPES}, gallery)
     draw_organ_springs({name: organ(name, nodes, fill=False) for name, nodes in PAPER_NODES.items()}, springs)
     paper = draw_paper(gallery.parent)
-    set_stamp(root, FIGURES)
     return [gallery, springs, *paper]
 
 

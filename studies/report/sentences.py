@@ -83,7 +83,7 @@ def table(published: Path, study: str, name: str = "") -> list[Row]:
     """The rows of the published table of a study, or of the table `name`. Raises StudyError where it is missing."""
     path = published / study / f"{name or study}.csv"
     if not path.is_file():
-        raise StudyError(f"there is no table {path} to read the findings from; `organbench publish {study}` writes it")
+        raise StudyError(f"there is no table {path} to read the findings from; `make publish` writes it")
     return [{str(name): value for name, value in row.items()} for row in pd.read_csv(path).to_dict("records")]
 
 

@@ -13,7 +13,6 @@ from studies.base.errors import StudyError
 from studies.cli.progress import TerminalProgress
 from studies.cli.terminal import Results, console, errors, say
 from studies.plots.campaigns.breaking import draw as draw_chart
-from studies.store.stamps import set_stamp
 from studies.store.tables import write_table
 from studies.tools.fuzz.campaign import counts, run_trials, table_of
 from studies.tools.fuzz.cuts import CutTrial
@@ -91,7 +90,6 @@ def write(results: Path, folder: str, table: pd.DataFrame, counted: pd.DataFrame
     """Counts and trials of a campaign, below `results`/`folder`."""
     say(write_table(results / folder / "counts.csv", counted))
     write_whole(results / folder / TRIALS, gzip.compress(table.to_csv(index=False).encode(), mtime=0))
-    set_stamp(results, folder)
     console.print(counted.to_string(index=False), markup=False, highlight=False)
 
 

@@ -18,7 +18,6 @@ from studies.exchange.league.frozen import frozen
 from studies.exchange.peers.contest import OURS, PEERS, TIME_LIMIT, Attempt, contest
 from studies.exchange.peers.sweep import NODES, swept
 from studies.scene.library import SCENES
-from studies.store.stamps import set_stamp
 
 TABLE = "sweep.csv"
 
@@ -51,8 +50,6 @@ def main(
                     rows.append(row)
                     pd.DataFrame(rows).to_csv(table, index=False, float_format="%.6g")
                     print(row, flush=True)
-            if not only:
-                set_stamp(results, f"{FOLDER}/{TABLE}")
             return
         scenes = [scene for scene in SCENES if scene.name in frozen()]
         attempts = [Attempt(peer, scene, nodes) for peer in chosen for scene in scenes]

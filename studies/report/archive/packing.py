@@ -18,13 +18,12 @@ import studies as package
 from massspring.sources import OWN, ROOT
 from studies.base.atomic import is_there, part_beside
 from studies.base.errors import StudyError
-from studies.catalog.study import Study
+from studies.catalog.study import Study, command_line
 from studies.exchange.entry import entry_files
 from studies.metrics.timing.cases import timing_file
 from studies.reference.reference_solves import STUDY as REFERENCES
 from studies.reference.reference_solves import reference_solves
 from studies.report.archive.crate import CITATION, CODE, citation_file, digest, write_crate
-from studies.report.publish import check_studies
 from studies.report.results import make_folder, refresh, report
 from studies.runs.current import case_path
 from studies.runs.user_code import files_of
@@ -32,6 +31,8 @@ from studies.store.archived import MANIFEST, check_no_archive
 from studies.store.ledger import Ledger
 from studies.store.links import link_study
 from studies.store.paths import record_files
+from studies.sweep.frame_times import timed_jobs
+from studies.sweep.standings import standings
 
 SUFFIX = ".zip"
 README = """# Results of organbench {version}: {names}
@@ -89,7 +90,7 @@ def pack(root: Path, studies: Sequence[Study], target: Path, day: str, extra: It
     if target.suffix != SUFFIX:
         raise StudyError(f"the name of an archive ends in {SUFFIX}, not '{target.name}'; give -o FILE{SUFFIX}")
     check_no_archive(root)
-    check_studies(Ledger(root), studies, "archived")
+    check_current(Ledger(root), studies)
     make_folder(target.parent)
     with TemporaryDirectory(dir=target.parent, prefix=f"{target.stem}-") as place:
         stage = Path(place) / "results"  # as commands in report.html name it
@@ -103,6 +104,23 @@ def pack(root: Path, studies: Sequence[Study], target: Path, day: str, extra: It
 def own_files(studies: Sequence[Study]) -> list[Path]:
     """The user's files in which methods and laws of the cases are."""
     return [file.path for s in studies for case in s.cases for file in files_of(case.method, case.body.law)]
+
+
+def check_current(ledger: Ledger, studies: Sequence[Study]) -> None:
+    """Raises StudyError when a piece of a study is missing or stale, a timing of this machine too."""
+    behind = dict[str, list[str]]()
+    for study in studies:
+        gaps = [f"{one.job.label} is {one.status}" for one in standings(ledger, study) if not one.ended]
+        untimed = [job for job in timed_jobs(ledger, study) if ledger.why_untimed(job) is not None]
+        gaps += [f"the frame time of {job.label} is missing or stale" for job in untimed]
+        if gaps:
+            behind[study.name] = gaps
+    if behind:
+        count, first = sum(map(len, behind.values())), next(iter(behind.values()))[0]
+        raise StudyError(
+            f"not archived: {first}" + (f", and {count - 1} more are missing or stale" if count > 1 else "") + "; "
+            f"run `{command_line('run', [study for study in studies if study.name in behind])}` first"
+        )
 
 
 def gather(root: Path, studies: Sequence[Study], stage: Path) -> list[str]:

@@ -11,7 +11,6 @@ from massspring import MassSpringError
 from reference_fem import SolveError
 from studies.base.errors import StudyError
 from studies.plots.silicone import Bar, Point, draw
-from studies.store.stamps import set_stamp
 from studies.tools.silicone.measured import LOADS
 from studies.tools.silicone.predict import (
     COARSE,
@@ -63,7 +62,6 @@ def main(results: Annotated[Path, typer.Option(help="folder of the results")] = 
         values = f"{row.sag:.2f} mm, {row.frequency:.3f} Hz, {row.damping:.4f}"
         print(f"{row.who}, {row.newton:g} N: {values}", flush=True)
     draw(rows, bars(), folder / "silicone.png")
-    set_stamp(results, "silicone")
 
 
 if __name__ == "__main__":

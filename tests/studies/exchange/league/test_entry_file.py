@@ -8,10 +8,7 @@ import pytest
 from studies.exchange.league.entry_file import LEAGUE, EntryFile
 from studies.exchange.league.frozen import SET, frozen
 from studies.exchange.meshes import given_mesh
-from studies.report import publish
 from studies.report.league.rows import COST, COUNT, league_rows
-from studies.report.publish import PUBLISHED
-from studies.report.published_code import noted
 from studies.scene.library import BALL_SQUEEZE
 from studies.store.record import read_record
 
@@ -126,28 +123,3 @@ def test_a_file_that_is_no_entry_is_refused(refused, tmp_path):
     assert "a.json cannot be read as an entry" in refused("judge", "ball_squeeze", tmp_path / "a.json")
     (tmp_path / "a.json").write_text("[]")
     assert "a.json holds no JSON object" in refused("judge", "ball_squeeze", tmp_path / "a.json")
-
-
-def test_the_league_is_published_from_its_entries_alone(organbench, refused, entry, tmp_path, monkeypatch):
-    """Table, chart and page; an entry that other code judged is refused."""
-    (tmp_path / "home").mkdir()
-    monkeypatch.chdir(tmp_path / "home")
-    monkeypatch.setattr(publish, "SENTENCES", ())  # this home has no pages
-    results, published = tmp_path / "results", tmp_path / "home" / PUBLISHED
-    assert "results/league is missing; run `make study-league` first" in refused(
-        "publish", "league", "--results", results
-    )
-    organbench("judge", "ball_squeeze", entry(), "--results", results)
-    (published / "league").mkdir(parents=True)
-    for name in ("older.png", "sweep.csv"):
-        (published / "league" / name).write_text("old")
-    code, _, err = organbench("publish", "league", "--results", results)
-    assert code == 0 and not err
-    names = {file.name for file in (published / "league").iterdir()}
-    assert names == {"league.csv", "league.html", "profiles.png", "sweep.csv"}
-    assert (published / "league" / "league.html").read_bytes() == (results / "league.html").read_bytes()
-    assert (published / "league" / "sweep.csv").read_text() == "old"  # its own command makes it
-    assert set(noted(published)) == {"league"}
-    monkeypatch.setattr(publish, "fingerprints", set)
-    sentence = refused("publish", "league", "--results", results)
-    assert "0 more entries were judged by other code; run `make study-league`" in sentence
