@@ -31,7 +31,7 @@ report: setup-run ## charts, tables and report.html, one page that opens anywher
 	$(BIN)/organbench report
 
 study-league: setup-run ## all programs and ours on the open scenes of the league, each in an environment of its own (half an hour)
-	$(BIN)/python -m studies.exchange.peers.main
+	$(BIN)/python -m studies.lab.league
 	$(BIN)/organbench report
 
 # What is current is skipped; so the same command goes on where it was interrupted.
@@ -40,10 +40,10 @@ publish: setup-verify compiled ## all that is published, again, by this machine 
 	$(BIN)/organbench run population
 	$(BIN)/python -m studies.lab.verify
 	$(BIN)/organbench report --figures
-	$(BIN)/python -m studies.tools.silicone.main
+	$(BIN)/python -m studies.lab.silicone
 	$(MAKE) fuzz
-	$(BIN)/python -m studies.exchange.peers.main --sweep
-	$(BIN)/python -m studies.exchange.peers.main
+	$(BIN)/python -m studies.lab.league --sweep
+	$(BIN)/python -m studies.lab.league
 	$(BIN)/python -m studies.lab.publish
 	$(BIN)/python -m studies.report.methods_page
 	$(BIN)/python -m studies.cli.commands_page

@@ -2,6 +2,8 @@ from .base.errors import StudyError as StudyError
 from .catalog import STUDIES as STUDIES
 from .catalog.study import Chart as Chart
 from .catalog.study import Study as Study
+from .exchange.export import export as export
+from .exchange.judge import judge as judge
 from .geometry.api.organs import organ as organ
 from .geometry.organs import SHAPES as SHAPES
 from .methods import METHODS as METHODS

@@ -14,7 +14,7 @@ from massspring.kernels.arrays.layout import BoundaryConditions
 from massspring.layout.state import State
 from massspring.methods.capabilities import Capabilities
 from studies.base.errors import StudyError
-from studies.exchange.precut import given_scene, reference_of
+from studies.exchange.meshes import given_scene, reference_of
 from studies.metrics.run import Run
 from studies.metrics.timing.protocol import FrameTiming
 from studies.reference.load import Reference

@@ -7,24 +7,32 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from studies.base.atomic import write_whole
 from studies.base.errors import StudyError
 from studies.exchange.description import CUT_FILES, FILES, HELD, LUMEN, OUTER, description
-from studies.exchange.meshes import STRAIGHT, GivenMesh, given_meshes
-from studies.exchange.precut import given_scene
-from studies.exchange.readme import readme
+from studies.exchange.meshes import NODES, STRAIGHT, GivenMesh, given_meshes, given_scene
 from studies.exchange.starter import NAME, SOLVER
 from studies.geometry.files.writing import write_grid_file
 from studies.geometry.mesh.organ_mesh import OrganMesh
 from studies.scene.scene import Scene
 
 DESCRIPTION, README = "scene.json", "README.md"
+PAGE = Environment(
+    loader=FileSystemLoader(Path(__file__).parent),
+    undefined=StrictUndefined,
+    trim_blocks=True,
+    lstrip_blocks=True,
+    keep_trailing_newline=True,
+).get_template("readme.md.jinja")
 DIGITS = 12
 """Significant digits of exported numbers: 3.6 and not 3.5999999999999996."""
 
 
-def export(scene: Scene, folder: Path, nodes: int, rows: Sequence[Sequence[str]] = ()) -> tuple[list[Path], str]:
+def export(
+    scene: Scene, folder: Path, nodes: int = NODES, rows: Sequence[Sequence[str]] = ()
+) -> tuple[list[Path], str]:
     """Writes the scene into `folder` with `nodes` vertices on its outer surface; the files, and why there is no curved
     mesh (nothing where there is one). rows: a body of ours, its error of force and of displacement [%], each as text.
 
@@ -36,7 +44,11 @@ def export(scene: Scene, folder: Path, nodes: int, rows: Sequence[Sequence[str]]
     check_folder(folder)
     meshes, why_not = given_meshes(scene, nodes)
     data = rounded(description(scene, meshes, why_not))
-    texts = {DESCRIPTION: json.dumps(data, indent=1) + "\n", README: readme(data, nodes, rows), NAME: SOLVER}
+    texts = {
+        DESCRIPTION: json.dumps(data, indent=1) + "\n",
+        README: PAGE.render(data, nodes=nodes, rows=rows),
+        NAME: SOLVER,
+    }
     if (folder / NAME).is_file() and (folder / NAME).read_text(encoding="utf-8", errors="replace") != SOLVER:
         del texts[NAME]
     written = [_write_mesh(mesh, folder) for mesh in meshes]

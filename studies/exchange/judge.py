@@ -2,6 +2,8 @@
 metrics use the record."""
 
 import hashlib
+import warnings
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,32 +14,68 @@ from massspring.layout.probe_arrays import tip_depth
 from massspring.sources import source_fingerprint
 from massspring.world.obstacles import Obstacle, Probe
 from studies.base.errors import StudyError
-from studies.exchange.entry import ENTRY, SECONDS, entry_name, outside
+from studies.exchange.entry import ENTRY, SECONDS, entry_name, entry_path, outside, run_of_entry
 from studies.exchange.fit import SAME, Fitting, fitted, force_at
 from studies.exchange.handed import read_force, read_handed
-from studies.exchange.meshes import GivenMesh, given_meshes
-from studies.exchange.precut import given_scene
+from studies.exchange.league import LEAGUE, EntryFile, check_entry, mesh_of_entry, read_entry_file
+from studies.exchange.meshes import NODES, given_meshes, given_scene
+from studies.metrics.run import Run
+from studies.reference.load import reference_for
 from studies.runs.case import Case
 from studies.runs.indicators import sway
 from studies.runs.prepare import LUMEN
 from studies.scene.scene import Scene
 from studies.store.new_record import new_fields, new_record
-from studies.store.record import Record, Status
+from studies.store.record import Record, Status, write_record
 from studies.store.schema import RUN_FIELDS
 
 STILL = "the body did not move"
 """Warning of an entry whose positions are those at rest in every step."""
 
 
+def judge(
+    scene: Scene,
+    file: Path,
+    results: Path = Path("results"),
+    *,
+    name: str = "",
+    nodes: int = NODES,
+    force: Path | None = None,
+    seconds: float | None = None,
+) -> Run:
+    """What another program computed, judged as our own runs are and kept with them below `results`.
+
+    file: npz, CSV, VTKHDF or PVD, a folder of VTU files, a pattern, or an entry of the league (JSON), which says all of
+    the rest itself; name: of the entry, by default that of the file; nodes: vertices on the outer surface with which
+    the scene was exported; force: a CSV file with the probed force [N]; seconds: computing time for a simulated second
+    [s/s]. Without the reference of the scene a warning, and no errors. Raises StudyError for anything that does not
+    fit the scene; nothing is kept then.
+    """
+    if file.suffix.lower() != ".json":
+        record = entry_record(scene, file, name or file.stem, nodes, force, seconds)
+    elif name or force is not None or seconds is not None:
+        raise StudyError(f"{file.name} says all about the entry itself; leave out --name, --force and --seconds")
+    else:
+        record = league_record(scene, read_entry_file(file), file.parent)
+    try:
+        reference = reference_for(results, scene)
+    except StudyError as problem:
+        warnings.warn(f"errors are not judged, because the reference is missing: {problem}", stacklevel=2)
+        reference = None
+    run = run_of_entry(record, reference)
+    write_record(judged_path(results, run), record)
+    return run
+
+
+def judged_path(results: Path, run: Run) -> Path:
+    """Where `judge` keeps an entry: those of the league lie apart, for they are shown on a page of their own."""
+    return entry_path(results / LEAGUE if LEAGUE in run.record.attributes else results, run.case)
+
+
 def entry_record(
     scene: Scene, path: Path, name: str, nodes: int, force: Path | None = None, seconds: float | None = None
 ) -> Record:
-    """The record of the results of another program.
-
-    path: as handed.read_handed takes it; name: of the entry; nodes: vertices on the outer surface with which the scene
-    was exported; force: a CSV file with the probed force; seconds: computing time for a simulated second [s/s].
-    Raises StudyError for anything that does not fit the scene.
-    """
+    """The record of the results of another program. Raises StudyError for anything that does not fit the scene."""
     method, scene = outside(name), given_scene(scene)
     if seconds is not None and not 0.0 < seconds < np.inf:
         raise StudyError(f"{seconds} s of computing for a simulated second is not a time; give a positive number")
@@ -47,18 +85,47 @@ def entry_record(
         if "force" in fitting.histories:
             raise StudyError(f"{handed.name} already has the force; leave out {force.name}")
         fitting.histories["force"] = force_at(force.name, fitting.t, *read_force(force), scene)
-    case = Case(scene, fitting.mesh.recipe, method)
     values = measured(fitting)
     inverted = values["min_j"][-1] <= 0.0
+    digest = hashlib.sha256(np.ascontiguousarray(fitting.positions).tobytes()).hexdigest()
+    about = {ENTRY: f"{path.name} sha256:{digest}", SECONDS: seconds}
+    if "force" in fitting.histories:  # how much it varies at the end
+        about["sway"] = sway(scene, values["t"], values["contact_force"], values["held_force"])
+    status, message = (Status.INVERTED, "an element is inverted at the end") if inverted else (Status.OK, "")
+    return _record(Case(scene, fitting.mesh.recipe, method), status, message, _attributes(fitting) | about, values)
+
+
+def league_record(scene: Scene, entry: EntryFile, folder: Path) -> Record:
+    """The record of an entry of the league whose result lies in `folder`; of one that has none, its reason. Raises
+    StudyError for anything that does not fit the set or the scene."""
+    check_entry(entry, scene.name)
+    mesh = mesh_of_entry(entry, scene)
+    if entry.result:
+        record = entry_record(scene, folder / entry.result, entry.engine, entry.nodes, seconds=entry.seconds)
+    else:
+        status = Status.SKIPPED if entry.skipped else Status.FAILED
+        case = Case(scene, mesh.recipe, outside(entry.engine))
+        record = unfinished_record(case, status, entry.skipped or entry.failed)
+    return replace(record, attributes=record.attributes | {LEAGUE: entry.model_dump_json()})
+
+
+def unfinished_record(case: Case, status: Status, message: str) -> Record:
+    """The record of an entry without results; `status` and `message` give the reason."""
+    return _record(case, status, message, {ENTRY: "nothing was handed in"}, {})
+
+
+def _record(
+    case: Case, status: Status, message: str, attributes: dict[str, Any], values: dict[str, np.ndarray]
+) -> Record:
     return new_record(
         kind="run",
         key=case.key,
         name=entry_name(case),
-        status=Status.INVERTED if inverted else Status.OK,
-        message="an element is inverted at the end" if inverted else "",
+        status=status,
+        message=message,
         fingerprint=source_fingerprint(__name__),
-        attributes=_attributes(fitting) | _sway(fitting, values) | {ENTRY: _named(path, fitting), SECONDS: seconds},
-        fields=new_fields(RUN_FIELDS, values),
+        attributes=attributes,
+        fields=new_fields(RUN_FIELDS, values) if values else {},
     )
 
 
@@ -73,7 +140,7 @@ def measured(fitting: Fitting) -> dict[str, np.ndarray]:
     pressure = np.zeros((steps, len(names)))
     for column, name in enumerate(names):
         pressure[:, column] = fitting.histories.get("lumen_pressure" if name == LUMEN else "pressure", 0.0)
-    return {
+    fields = {
         "t": t,
         "volume": np.array([mesh.volumes.measure(each) for each in x]),
         "volume_target": mesh.volume_targets(t),
@@ -88,16 +155,11 @@ def measured(fitting: Fitting) -> dict[str, np.ndarray]:
         "mass": body.mass,
         "triangles": body.triangles,
         "tetrahedra": body.tetrahedra,
-        **_cut(mesh),
     }
-
-
-def _cut(mesh: GivenMesh) -> dict[str, np.ndarray]:
-    """The faces of a body that is cut; each kept volume is a piece."""
-    if mesh.scene.cut is None:
-        return {}
-    faces = faces_behind(mesh.body.triangles.astype(np.int64), mesh.pairs, len(mesh.points))
-    return {"cut_faces": faces, "cut_pairs": mesh.pairs, "cut_parts": np.arange(len(mesh.volumes.names))}
+    if scene.cut is not None:  # each kept volume is a piece
+        fields["cut_faces"] = faces_behind(body.triangles.astype(np.int64), mesh.pairs, len(mesh.points))
+        fields |= {"cut_pairs": mesh.pairs, "cut_parts": np.arange(len(names))}
+    return fields
 
 
 def _depth(obstacle: Obstacle, x: np.ndarray, surface: np.ndarray, triangles: np.ndarray, t: float) -> float:
@@ -119,8 +181,9 @@ def _forces(scene: Scene, force: np.ndarray | None, steps: int) -> dict[str, np.
 
 
 def _attributes(fitting: Fitting) -> dict[str, Any]:
-    mesh, steps = fitting.mesh, len(fitting.t)
+    mesh, steps, rest = fitting.mesh, len(fitting.t), fitting.mesh.points
     names = mesh.volumes.names
+    moved = np.linalg.norm(fitting.positions - rest, axis=-1).max() > SAME * np.linalg.norm(np.ptp(rest, axis=0))
     return {
         "rest_volume": mesh.body.volume,
         "dt": float("nan"),
@@ -137,37 +200,5 @@ def _attributes(fitting: Fitting) -> dict[str, Any]:
         "capped_steps": 0,
         "volumes": len(names),
         "lumen_column": names.index(LUMEN) if LUMEN in names else -1,
-        "warnings": "" if _has_moved(fitting) else STILL,
+        "warnings": "" if moved else STILL,
     } | ({} if mesh.scene.cut is None else {"cut_frame": 0})
-
-
-def _has_moved(fitting: Fitting) -> bool:
-    rest = fitting.mesh.points
-    size = np.linalg.norm(np.ptp(rest, axis=0))
-    return bool(np.linalg.norm(fitting.positions - rest, axis=-1).max() > SAME * size)
-
-
-def _sway(fitting: Fitting, values: dict[str, np.ndarray]) -> dict[str, float]:
-    """The variation of the force at the end; NaN if unknown."""
-    if "force" not in fitting.histories:
-        return {}
-    return {"sway": sway(fitting.mesh.scene, values["t"], values["contact_force"], values["held_force"])}
-
-
-def _named(path: Path, fitting: Fitting) -> str:
-    digest = hashlib.sha256(np.ascontiguousarray(fitting.positions).tobytes()).hexdigest()
-    return f"{path.name} sha256:{digest}"
-
-
-def unfinished_record(case: Case, status: Status, message: str) -> Record:
-    """The record of an entry without results; `status` and `message` give the reason."""
-    return new_record(
-        kind="run",
-        key=case.key,
-        name=entry_name(case),
-        status=status,
-        message=message,
-        fingerprint=source_fingerprint(__name__),
-        attributes={ENTRY: "nothing was handed in"},
-        fields={},
-    )

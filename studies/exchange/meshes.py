@@ -1,7 +1,11 @@
-"""The meshes on which results are submitted: the straight and the curved one of a scene's organ."""
+"""What is given to other programs: the scene, and the straight and the curved mesh of its organ.
+
+A scene with a cut is for programs that cannot cut: its meshes are cut from the start, and only checkpoints after the
+cut count. The tissue has no memory, so an equilibrium after the cut does not depend on when it was made.
+"""
 
 import hashlib
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -16,16 +20,62 @@ from studies.meshing.graded_mesh import mesh_at
 from studies.meshing.opened_mesh import opened_mesh
 from studies.meshing.quadratic_mesh import QuadraticMesh
 from studies.meshing.scene_mesh import mesh_for, patch_nodes
+from studies.reference.load import Reference
 from studies.runs.case import BodyRecipe
 from studies.runs.cutting import pieces_of
 from studies.runs.prepare import LUMEN, body_for
 from studies.scene.scene import Scene
+from studies.store.schema import REFERENCE_FIELDS
 
 STRAIGHT, CURVED = "straight", "curved"
 NODES = 550
 """Default number of vertices on the outer surface."""
 GRAIN = 1e-7
 """Rounding of rest positions before they are hashed [m]: far above round-off, far below an edge."""
+
+
+def given_scene(scene: Scene) -> Scene:
+    """The scene for another program; for a scene with a cut, only with the checkpoints after it.
+
+    Raises StudyError for a cut whose time matters: one in a scene without equilibria, one that allows free pieces, or
+    one that opens a lumen; for several cuts, and for one after which there is no checkpoint.
+    """
+    if len(scene.cuts) > 1:
+        raise StudyError(
+            f"scene '{scene.name}' cannot be given away cut from the start: it has {len(scene.cuts)} cuts, and files "
+            "and words of an export are of one"
+        )
+    cut = scene.cut
+    if cut is None:
+        return scene
+    if cut.free or scene.start is not None:
+        what = f"cut '{cut.name}' lets a piece go" if cut.free else "it starts in motion"
+        raise StudyError(f"scene '{scene.name}' cannot be given away cut from the start: {what}, so its time matters")
+    if cut.opens_lumen:
+        raise StudyError(
+            f"scene '{scene.name}' cannot be given away cut from the start: cut '{cut.name}' opens a lumen, whose "
+            "volume is kept until then"
+        )
+    after = tuple(t for t in scene.checkpoints if t > cut.ends)
+    if not after:
+        raise StudyError(
+            f"scene '{scene.name}' has no checkpoint after its cut '{cut.name}' at {cut.ends:g} s; add one"
+        )
+    return replace(scene, checkpoints=after)
+
+
+def reference_of(scene: Scene, reference: Reference | None) -> Reference | None:
+    """The reference of a scene at the checkpoints of the same scene as given_scene has it."""
+    count = len(scene.checkpoints)
+    if reference is None or count == len(reference.scene.checkpoints):
+        return reference
+    fields = dict(reference.record.fields)
+    for name, stored in fields.items():
+        lengths = REFERENCE_FIELDS[name].shape.split()
+        if "K" in lengths:
+            late = np.take(stored.values, range(-count, 0), axis=lengths.index("K"))
+            fields[name] = replace(stored, values=late)
+    return Reference(scene, replace(reference.record, fields=fields))
 
 
 @dataclass(frozen=True, eq=False)

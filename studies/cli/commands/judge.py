@@ -5,22 +5,18 @@ from typing import Annotated
 
 import typer
 
-from studies.base.errors import StudyError
 from studies.catalog import STUDIES
 from studies.cli.terminal import Results, SceneName, busy, say, warn
 from studies.exchange.description import judged_metrics
-from studies.exchange.entry import entry_path, run_of_entry
-from studies.exchange.judge import entry_record
-from studies.exchange.league import FOLDER
-from studies.exchange.league.entry_file import check_entry, check_mesh_here, judged_file, read_entry_file
+from studies.exchange.entry import entry_files
+from studies.exchange.judge import judge as judged
+from studies.exchange.judge import judged_path
+from studies.exchange.league import LEAGUE, check_entry, read_entry_file
 from studies.exchange.meshes import NODES
 from studies.metrics.cells import UNRESOLVED_NOTE, plain, value_cell
 from studies.metrics.judged import FORCE
 from studies.metrics.run import Run
-from studies.reference.load import Reference, reference_for
 from studies.scene.quantities import ALWAYS
-from studies.scene.scene import Scene
-from studies.store.record import write_record
 from studies.sweep.find_scene import find_scene
 
 REVERSED = -100.0
@@ -42,43 +38,28 @@ def judge(
     results: Results = Path("results"),
 ) -> None:
     """Judge the results of another program like our own: positions, forces, times. Keep them with our results."""
-    entry = read_entry_file(file) if file.suffix.lower() == ".json" else None
-    if entry is not None:
-        if name or force is not None or seconds is not None:
-            raise StudyError(f"{file.name} says all about the entry itself; leave out --name, --force and --seconds")
-        check_entry(entry, scene)
+    if file.suffix.lower() == ".json":
+        check_entry(read_entry_file(file), scene)  # a scene that is held back is no scene here
     chosen_scene = find_scene(scene)
+    before = {*entry_files(results), *entry_files(results / LEAGUE)}
     with busy(f"judging {file.name}"):
-        if entry is None:
-            record = entry_record(chosen_scene, file, name or file.stem, nodes, force, seconds)
-        else:
-            check_mesh_here(entry, chosen_scene)
-            record = judged_file(chosen_scene, entry, file.parent)
-        run = run_of_entry(record, reference_of(results, chosen_scene))
-    path = entry_path(results if entry is None else results / FOLDER, run.case)
-    replaced = path.is_file()
-    write_record(path, record)
-    mesh = "the curved mesh" if run.case.body.kind == "quadratic" else "the straight mesh"
-    steps = record.attributes["frames"]
-    say(f"{run.case.method.name}: {record.status}, {record.attributes['nodes']} nodes of {mesh}, {steps} steps")
-    for line in lines_of(run):
-        say(line)
-    warn(hints_of(run))
-    if replaced:
+        run = judged(chosen_scene, file, results, name=name, nodes=nodes, force=force, seconds=seconds)
+    attributes, path = run.record.attributes, judged_path(results, run)
+    if run.record.fields:
+        mesh = "the curved mesh" if run.case.body.kind == "quadratic" else "the straight mesh"
+        size = f"{attributes['nodes']} nodes of {mesh}, {attributes['frames']} steps"
+        say(f"{run.case.method.name}: {run.record.status}, {size}")
+        for line in lines_of(run):
+            say(line)
+        warn(hints_of(run))
+    else:
+        say(f"{run.case.method.name}: {run.record.status}, {run.record.message}")
+    if path in before:
         warn([f"it replaces an entry named {run.case.method.name} on the same mesh"])
     names = [study.name for study in STUDIES if chosen_scene.name in [each.name for each in study.scenes]]
-    command = "report" if entry is not None else f"table {names[-1]}" if names else ""
+    command = "report" if LEAGUE in attributes else f"table {names[-1]}" if names else ""
     shown = f", shown next to our methods by `organbench {command}`" if command else ""
     say(f"stored in {path}{shown}")
-
-
-def reference_of(results: Path, scene: Scene) -> Reference | None:
-    """The stored reference of a scene; without one, a warning: then no errors are judged."""
-    try:
-        return reference_for(results, scene)
-    except StudyError as problem:
-        warn([f"errors are not judged, because the reference is missing: {problem}"])
-        return None
 
 
 def hints_of(run: Run) -> list[str]:

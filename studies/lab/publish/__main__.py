@@ -21,7 +21,7 @@ EXTRAS = {
     "league": "make study-league",
     "verify": "python -m studies.lab.verify",
     "figures": "organbench report --figures",
-    "silicone": "python -m studies.tools.silicone.main",
+    "silicone": "python -m studies.lab.silicone",
     "breaking": "organbench fuzz --cases 10000",
     "breaking_reference": "organbench fuzz --reference --cases 300",
     "breaking_cuts": "organbench fuzz --cuts --cases 1000",

@@ -9,8 +9,7 @@ import pandas as pd
 from markupsafe import Markup
 
 from studies.base.atomic import write_whole
-from studies.exchange.league import FOLDER
-from studies.exchange.league.frozen import SET, frozen
+from studies.exchange.league import LEAGUE, SET, frozen
 from studies.metrics.cells import MISSING, plain, value_cell
 from studies.metrics.metric import COMPARABLE
 from studies.report.league.rows import (
@@ -53,7 +52,7 @@ def write_league(root: Path, with_report: bool = False) -> tuple[list[Path], lis
     rows, remarks = league_rows(root)
     if not rows:
         return [], remarks
-    folder = root / FOLDER
+    folder = root / LEAGUE
     folder.mkdir(parents=True, exist_ok=True)
     write_table(folder / TABLE, pd.DataFrame(rows))
     with svg_copies() as pictures:
@@ -108,7 +107,7 @@ def page(rows: Sequence[Row], svg: str, with_report: bool = False) -> bytes:
 
 def league_cards(root: Path) -> list[dict[str, Any]]:
     """The cards of the page that lies in the results folder `root`, none without one: for the section of the report."""
-    table = root / FOLDER / TABLE
+    table = root / LEAGUE / TABLE
     if not (table.is_file() and (root / NAME).is_file()):
         return []
     read = pd.read_csv(table, keep_default_na=True).astype({"ours": bool})

@@ -7,9 +7,7 @@ from typing import Any
 
 from studies.base.errors import StudyError
 from studies.exchange.entry import entry_files, run_of_entry
-from studies.exchange.league import FOLDER
-from studies.exchange.league.entry_file import LEAGUE
-from studies.exchange.league.frozen import frozen
+from studies.exchange.league import LEAGUE, frozen
 from studies.metrics.judged import cost_of
 from studies.metrics.metric import COMPARABLE
 from studies.metrics.table import metric
@@ -32,7 +30,7 @@ def league_rows(root: Path) -> tuple[list[dict[str, Any]], list[str]]:
     """All entries of the league below the results folder `root` by engine, scene and nodes, and what cannot be read, a
     sentence each."""
     rows, problems = [], []
-    for path in entry_files(root / FOLDER):
+    for path in entry_files(root / LEAGUE):
         try:
             rows.append(_row(path))
         except StudyError as problem:

@@ -15,17 +15,14 @@ from massspring import tetrahedral_body as body_of
 from studies.base.errors import StudyError
 from studies.exchange.entry import entries_beside
 from studies.exchange.export import export
-from studies.exchange.meshes import given_mesh
-from studies.exchange.peers import own
-from studies.exchange.peers.scene_folder import CannotDo, SceneFolder
-from studies.exchange.precut import given_scene, reference_of
+from studies.exchange.meshes import given_mesh, given_scene, reference_of
 from studies.geometry.mesh.organ_mesh import boundary_triangles, tetrahedron_volumes
 from studies.metrics.metrics import force_end, mean_error, opening_error
 from studies.metrics.run import Run
 from studies.reference.load import reference_for
 from studies.runs.case import BodyRecipe, Case
 from studies.runs.run import measure
-from studies.scene.library import BALL_BISECTED, BALL_CUT_PRESSED, BALL_INCISED, BALL_SQUEEZE
+from studies.scene.library import BALL_BISECTED, BALL_INCISED, BALL_SQUEEZE
 from studies.scene.library.ball_incised import RADIUS
 from studies.scene.library.liver_cut_live import LIVER_CUT_LIVE
 from studies.scene.library.shell_opened import SHELL_OPENED
@@ -184,21 +181,6 @@ def test_pieces_keep_a_volume_each(mesh_cache):
         half = 2 / 3 * np.pi * RADIUS**3
         assert mesh.volumes.names == ("piece 0", "piece 1")
         assert mesh.volumes.measure(mesh.points) == pytest.approx([half, half], rel=0.07)
-
-
-def test_our_own_adapter_enters_on_the_exported_mesh(folder, cut_body, tmp_path):
-    own.run(SceneFolder(folder), tmp_path / "ours.npz", method="implicit_volume")
-    with np.load(tmp_path / "ours.npz") as handed:
-        np.testing.assert_allclose(handed["positions"][0], meshio.read(folder / "straight.vtu").points, atol=1e-12)
-        assert np.abs(handed["positions"][-1] - cut_body.fields.snapshots[-1]).max() < 1e-6 * SIZE
-
-
-def test_adapters_without_contact_of_faces_say_so(tmp_path, mesh_cache):
-    export(BALL_CUT_PRESSED, tmp_path / "pressed", NODES)
-    page = (tmp_path / "pressed" / "README.md").read_text()
-    assert "touch without friction where the cut closes" in page
-    with pytest.raises(CannotDo, match="lets the faces of a cut pass through each other"):
-        SceneFolder(tmp_path / "pressed").check_simple()
 
 
 def test_a_cut_whose_time_matters_is_not_given_away(tmp_path):

@@ -6,7 +6,7 @@ import re
 import numpy as np
 import pytest
 
-from studies.exchange.league.frozen import SET, frozen
+from studies.exchange.league import SET, frozen
 from studies.plots.campaigns.league import figure
 from studies.reference.published import published
 from studies.report.league.page import page, profiles

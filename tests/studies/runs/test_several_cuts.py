@@ -9,7 +9,7 @@ import pytest
 from massspring import ImplicitVolume, Trajectory, simulate
 from reference_fem import equilibrium_path, nodes
 from studies.base.errors import DoesNotApply, StudyError
-from studies.exchange.precut import given_scene
+from studies.exchange.meshes import given_scene
 from studies.geometry import HalfSpace, OrganMesh, organ
 from studies.geometry.mesh.organ_mesh import boundary_triangles, signed_volume
 from studies.meshing.nested_mesh import base_mesh

@@ -1,1 +1,0 @@
-"""Makes the frozen set of the league."""

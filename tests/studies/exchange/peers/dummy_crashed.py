@@ -1,1 +1,0 @@
-from tests.studies.exchange.peers.dummies import crashed as run  # noqa: F401

@@ -1,1 +1,0 @@
-from tests.studies.exchange.peers.dummies import shifted as run  # noqa: F401
