@@ -42,7 +42,7 @@ def start(
     )
     work = Workspace(
         padded_positions=aligned((n, 4), real),
-        tile=aligned((1, TILE), real),
+        tile=aligned((TILE,), real),
         pulled=aligned((slices.pieces, RESULT), real),
         sums=np.zeros((len(slices.lanes) + 1, 3)),
     )

@@ -9,7 +9,6 @@ from massspring.kernels.arrays.face_pairs import FacePairs
 from massspring.kernels.arrays.layout import BoundaryConditions, Contacts, FrameDiagnostics, Model, Nodes, Workspace
 from massspring.kernels.arrays.volume_rows import VolumeRows
 from massspring.kernels.jit.stage_clock import UNTIMED, StageTimes
-from massspring.kernels.jit.thread_team import ThreadTeam
 from massspring.kernels.points.arrays import PointRows
 from massspring.kernels.probe.arrays import Probing
 from massspring.kernels.step.frame import Frame
@@ -38,9 +37,6 @@ class State:
     """Faces of a cut that may touch, or None; with None the frame is compiled without them."""
     permutation: np.ndarray | None = None
     """Index of each node of the body in `model` and `nodes`, (n,); None if the numbers are the same."""
-
-    team: ThreadTeam | None = None
-    """Threads that share the longest loops of a frame; None for one thread."""
     origin: np.ndarray | None = None
     """Origin of `nodes.x` and `model.held_rest` [m], (3,); None for the origin of the body."""
 
@@ -57,9 +53,7 @@ class State:
 
     def frame(self, boundary: BoundaryConditions) -> Frame:
         """The arguments of a frame loop."""
-        return Frame(
-            self.model, self.nodes, self.contacts, self.work, boundary, self.diagnostics, self.probing, self.team
-        )
+        return Frame(self.model, self.nodes, self.contacts, self.work, boundary, self.diagnostics, self.probing)
 
     def moved_to(self, x: np.ndarray) -> "State":
         """The same at positions `x` (n, 3) [m]."""

@@ -56,7 +56,6 @@ class Capabilities:
     """Thin probes, with contact in continuous time."""
     face_contact: Support = No("its steps do not keep the faces of a cut apart")
     """Faces of a cut that touch each other."""
-    threads: Support = No("its steps are not divided among threads")
     float32: Support = No("its claims are measured in float64")
     """A state in single precision."""
     events: Support = True

@@ -9,7 +9,7 @@ from massspring.kernels.step.begin import begin_step, open_frame, search_contact
 from massspring.kernels.step.end import end_step
 from massspring.layout.state import State
 from massspring.methods.capabilities import Capabilities
-from massspring.methods.method import Method, threaded_frame
+from massspring.methods.method import Method, begin_frame
 
 
 @njit_lean
@@ -30,10 +30,10 @@ class Free(Method):
     name: ClassVar[str] = "free"
     order: ClassVar[int] = 1
     volume_tol: ClassVar[float | None] = None
-    capabilities: ClassVar[Capabilities] = Capabilities("none", thin_probes=True, threads=True, float32=True)
+    capabilities: ClassVar[Capabilities] = Capabilities("none", thin_probes=True, float32=True)
 
     def advance(self, state: State, boundary: BoundaryConditions) -> State:
         """One frame."""
-        with threaded_frame(state, boundary) as after:
-            free_frame(after.frame(boundary))
+        after = begin_frame(state, boundary)
+        free_frame(after.frame(boundary))
         return after

@@ -50,7 +50,7 @@ from massspring.layout.state import State
 from massspring.methods.capabilities import Capabilities, No
 from massspring.methods.families.points import point_volumes_frame
 from massspring.methods.families.recovery import followed_by, is_back, recovery_of, simpler, why_not_recover
-from massspring.methods.method import Method, threaded_frame
+from massspring.methods.method import Method, begin_frame
 from massspring.world.obstacles import Attachment
 
 
@@ -202,14 +202,13 @@ class ImplicitVolume(Method):
         facet_contact=True,
         thin_probes=True,
         face_contact=True,
-        threads=True,
         float32=True,
     )
 
     def __post_init__(self) -> None:
         if self.recovers:
             limits = dict.fromkeys(
-                ("thin_probes", "threads", "float32", "events", "face_contact"), No("it may settle into another shape")
+                ("thin_probes", "float32", "events", "face_contact"), No("it may settle into another shape")
             )
             object.__setattr__(self, "capabilities", replace(self.capabilities, **limits))
 
@@ -234,14 +233,14 @@ class ImplicitVolume(Method):
                 simple = self.advance(*simpler(state, state.memory, boundary))
                 return followed_by(state, state.memory, simple, len(boundary.position))
             state = replace(state, memory=None, lam=np.zeros_like(state.lam))
-        with threaded_frame(state, boundary) as after:
-            if after.rows is None:
-                lam = implicit_volume_frame(after.frame(boundary), float(after.lam[0]), after.pairs)
-                return replace(after, lam=np.array([lam]))
-            after.rows.lam[:] = after.lam + after.model.rest_lam
-            accuracy = Accuracy(self.tolerance, self.most_iterations)
-            if isinstance(after.rows, PointRows):
-                point_volumes_frame(after.frame(boundary), after.rows, None, accuracy, after.pairs)
-            else:
-                implicit_volumes_frame(after.frame(boundary), after.rows, accuracy, after.pairs)
-            return replace(after, lam=after.rows.lam - after.model.rest_lam)
+        after = begin_frame(state, boundary)
+        if after.rows is None:
+            lam = implicit_volume_frame(after.frame(boundary), float(after.lam[0]), after.pairs)
+            return replace(after, lam=np.array([lam]))
+        after.rows.lam[:] = after.lam + after.model.rest_lam
+        accuracy = Accuracy(self.tolerance, self.most_iterations)
+        if isinstance(after.rows, PointRows):
+            point_volumes_frame(after.frame(boundary), after.rows, None, accuracy, after.pairs)
+        else:
+            implicit_volumes_frame(after.frame(boundary), after.rows, accuracy, after.pairs)
+        return replace(after, lam=after.rows.lam - after.model.rest_lam)

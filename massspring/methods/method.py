@@ -1,8 +1,6 @@
 """The base class of methods: settings (a frozen dataclass), claims and capabilities (class variables), one compiled
 loop."""
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import replace
 from typing import ClassVar, Protocol
 
@@ -14,7 +12,6 @@ from massspring.kernels.arrays.layout import BoundaryConditions
 from massspring.layout.allocate import start
 from massspring.layout.probe_arrays import fresh
 from massspring.layout.state import State, new_diagnostics
-from massspring.layout.threads import team_at_work
 from massspring.methods.capabilities import Capabilities
 from massspring.world.obstacles import Attachment
 from massspring.world.surroundings import Surroundings
@@ -64,12 +61,3 @@ def begin_frame(state: State, boundary: BoundaryConditions) -> State:
     diagnostics = new_diagnostics(obstacles, boundary.held_displacement.shape[1], state.diagnostics.stage_times)
     probing = None if state.probing is None else fresh(state.probing, diagnostics)
     return replace(state, nodes=nodes, diagnostics=diagnostics, probing=probing)
-
-
-@contextmanager
-def threaded_frame(state: State, boundary: BoundaryConditions) -> Iterator[State]:
-    """A copy to advance in place; inside the context all threads of the state are running."""
-    after = begin_frame(state, boundary)
-    direction = after.nodes.gradient if after.rows is None else after.rows.push
-    with team_at_work(after.frame(boundary), direction):
-        yield after

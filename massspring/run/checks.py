@@ -15,7 +15,6 @@ from massspring.errors import MassSpringError
 from massspring.kernels.arrays.layout import BoundaryConditions
 from massspring.layout.probe_arrays import tip_depth
 from massspring.layout.state import State
-from massspring.layout.threads import cores
 from massspring.methods.capabilities import No
 from massspring.methods.method import Method
 from massspring.world.obstacles import Attachment, Capsule, Obstacle, Plane, Probe, Sphere
@@ -169,24 +168,11 @@ def starting_depth(obstacle: Plane | Sphere | Capsule, body: Body, x: np.ndarray
     return max(depth, obstacle.radius) if inside else depth
 
 
-def check_threads(threads: int, method: Method) -> None:
-    """Raises MassSpringError for an invalid number of threads, for more threads than cores, and if `method` cannot use
-    them."""
-    if isinstance(threads, bool) or not isinstance(threads, int) or threads < 1:
-        raise MassSpringError(f"{threads!r} is not a number of threads; give 1 or more")
-    if threads > cores():
-        raise MassSpringError(f"{threads} threads need as many cores, this process may use {cores()}; give fewer")
-    supported = method.capabilities.threads
-    if threads > 1 and isinstance(supported, No):
-        raise MassSpringError(f"method '{method.name}' runs on one thread, {supported.because}; leave threads at 1")
-
-
 def check_face_pairs(
     pairs: np.ndarray,
     method: Method,
     attachments: Collection[Attachment],
     precision: str,
-    threads: int,
     probes: bool,
 ) -> None:
     """Raises MassSpringError for faces of a cut that may touch in a run that cannot keep them apart."""
@@ -196,9 +182,9 @@ def check_face_pairs(
             f"method '{method.name}' does not support contact between the faces of a cut: {supported.because}; "
             "take implicit_volume, or leave the pairs out"
         )
-    if precision != "float64" or threads != 1 or probes:
+    if precision != "float64" or probes:
         raise MassSpringError(
-            "faces of a cut that may touch are advanced in float64, by one thread and without thin probes; "
+            "faces of a cut that may touch are advanced in float64 and without thin probes; "
             "leave these out"
         )
     held = np.isin(np.asarray(pairs), np.concatenate([[], *(np.asarray(a.nodes) for a in attachments)]))

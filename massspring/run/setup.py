@@ -13,7 +13,6 @@ from massspring.kernels.arrays.layout import BoundaryConditions, Tips
 from massspring.layout.face_pairs import face_pairs
 from massspring.layout.probe_arrays import new_probing
 from massspring.layout.state import State
-from massspring.layout.threads import shared
 from massspring.methods.method import Method
 from massspring.run.checks import (
     check_among,
@@ -26,7 +25,6 @@ from massspring.run.checks import (
     check_solid,
     check_surroundings,
     check_targets,
-    check_threads,
 )
 from massspring.run.events import Easing, Event, check_event, check_events
 from massspring.run.precision import Precision, check_precision, in_precision
@@ -60,8 +58,6 @@ class Setup:
     """Initial positions [m], (n, 3); None: those at rest."""
     precision: Precision = "float64"
     """Of the state; "float32" is faster and meets volumes to 1e-5 wherever the body lies, for methods that claim it."""
-    threads: int = 1
-    """Threads that share a step; the result is the same to the last bit. They pay for bodies of some thousand nodes."""
     events: tuple[Event, ...] = ()
     """Changes of the body between frames, such as cuts."""
     pairs: np.ndarray | None = None
@@ -76,9 +72,8 @@ class Setup:
         check_among(around, self.method)
         check_precision(self.precision, self.method)
         check_facets(self.precision, self.body, self.solids)
-        check_threads(self.threads, self.method)
         if self.pairs is not None:
-            check_face_pairs(self.pairs, self.method, self.attachments, self.precision, self.threads, bool(self.probes))
+            check_face_pairs(self.pairs, self.method, self.attachments, self.precision, bool(self.probes))
         limited = self.method.capabilities.conditionally_stable
         check_surroundings(self.gravity, self.damping, self.clock.dt if limited else 0.0)
         check_nodal("initial velocities", self.velocity, self.body)
@@ -98,7 +93,7 @@ class Setup:
                 stacklevel=3,
             )
         if self.events:
-            check_events(self.events, self.clock.frames, self.method, self.precision, self.threads, bool(self.probes))
+            check_events(self.events, self.clock.frames, self.method, self.precision, bool(self.probes))
             self.later  # noqa: B018 — each later set-up is checked too
 
     @cached_property
@@ -173,9 +168,7 @@ class Setup:
             state = state.moved_to(self.positions)
         if self.precision == "float32":
             state = in_precision(state.relative_to(self.origin), self.precision)
-        if self.threads == 1:
-            return state
-        return shared(state, self.threads)
+        return state
 
     @cached_property
     def _unmoved(self) -> dict[str, Any]:

@@ -61,7 +61,6 @@ OPTIONS: Mapping[str, str] = {
     "facet_contact": "contact inside facets",
     "thin_probes": "thin probes",
     "face_contact": "faces of a cut that touch",
-    "threads": "several threads",
     "float32": "float32",
     "events": "cuts",
 }

@@ -9,4 +9,4 @@ from massspring.kernels.jit.decorators import njit_lean
 def gather_and_predict(model, nodes, work, boundary, keeps):
     """v* and (V, G·v*, G·W·G) from `x`, as `predict_from_places`."""
     pad_positions(nodes, work, 0, nodes.x.shape[0])
-    return predict_from_places(model, nodes, work, boundary, keeps, None)
+    return predict_from_places(model, nodes, work, boundary, keeps)

@@ -14,7 +14,7 @@ from studies.base.errors import StudyError
 from studies.catalog import STUDIES
 from studies.sweep.compiling import main, tasks
 from studies.sweep.compiling.bodies import EDGE, KINDS, tiny_block, tiny_body
-from studies.sweep.compiling.frames import OWN_TYPES, PLAIN, PROBE, THREADS, Variant, advance, setup_of, variants
+from studies.sweep.compiling.frames import OWN_TYPES, PLAIN, PROBE, Variant, advance, setup_of, variants
 from studies.sweep.compiling.log import listing, summary
 
 
@@ -33,7 +33,7 @@ def test_every_method_is_there_in_each_form_that_it_supports():
         own = [variant for variant in forms if variant.method == method()]
         table = method.capabilities
         assert {variant.option for variant in own} == {
-            option for option, yes in ((PLAIN, True), (PROBE, table.thin_probes), (THREADS, table.threads)) if yes
+            option for option, yes in ((PLAIN, True), (PROBE, table.thin_probes)) if yes
         }
         assert {variant.precision for variant in own} == {"float64", "float32"} if table.float32 else {"float64"}
         kinds = {variant.kind for variant in own}

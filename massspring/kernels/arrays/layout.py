@@ -97,7 +97,7 @@ class Workspace(NamedTuple):
     padded_positions: np.ndarray
     """Positions [m] and a zero, (n, 4)."""
     tile: np.ndarray
-    """Scratch of `kernels.fused`, one row per thread."""
+    """Scratch of `kernels.fused` for one slice (kernels.fused.chunk)."""
     pulled: np.ndarray
     """Forces and 6 G of the slices of pieces, (pieces, 384)."""
     sums: np.ndarray

@@ -11,7 +11,6 @@ from massspring.kernels.contact.modes import FREE, ON_EDGE, SLIDES
 from massspring.kernels.contact.node_contact import round_contact
 from massspring.kernels.jit.blocks import BLOCK, any_gap_within
 from massspring.kernels.jit.decorators import njit_exposed, njit_inlined, njit_lean
-from massspring.kernels.jit.thread_team import JOB_SEARCH, fork, join
 
 CONTACT_PASSES = 3
 """Active-set passes a step: one when nothing changes; lam is always solved for the set that is applied."""
@@ -83,23 +82,12 @@ def forget_released(contacts):
     contacts.active_count[0] = kept
 
 
-@njit_inlined
-def predict_gaps(model, nodes, contacts, boundary, step, push, team):
-    """`predicted_gaps_into` of all nodes, by as many threads as there are."""
-    if team is None:
-        predicted_gaps_into(model, nodes, contacts, boundary, step, push, (0, nodes.x.shape[0]))
-    else:
-        fork(team, JOB_SEARCH, step, push.factor)
-        predicted_gaps_into(model, nodes, contacts, boundary, step, push, (team.nodes[0], team.nodes[1]))
-        join(team)
-
-
 @njit_exposed
-def find_contacts(model, nodes, contacts, boundary, step, push, team):
+def find_contacts(model, nodes, contacts, boundary, step, push):
     """Finds the touched nodes of the step, with the push f of the last step acting on them: u = v* + dt W f (eq.
     3.7)."""
     release_all(contacts)
-    predict_gaps(model, nodes, contacts, boundary, step, push, team)
+    predicted_gaps_into(model, nodes, contacts, boundary, step, push)
     enter(model, nodes, contacts, boundary, step, push)
 
 

@@ -12,17 +12,16 @@ from massspring.kernels.jit.flat import flat
 
 
 @njit_inlined
-def predicted_gaps_into(model, nodes, contacts, boundary, step, push, part):
+def predicted_gaps_into(model, nodes, contacts, boundary, step, push):
     """gap_i = min over obstacles of the distance of y = x + dt (v* + dt W f) [m], f the push (eq. 3.7).
 
-    Of the nodes first ≤ i < last in `part`, those that nothing can touch among them.
+    Of all nodes, those that nothing can touch among them.
     """
-    first, last = part
-    real = nodes.x.dtype.type
-    x, v_star = flat(nodes.x, first, last), flat(nodes.v_star, first, last)
-    direction, inverse_mass = flat(push.direction, first, last), flat(model.inverse_mass, first, last)
+    n, real = nodes.x.shape[0], nodes.x.dtype.type
+    x, v_star = flat(nodes.x, 0, n), flat(nodes.v_star, 0, n)
+    direction, inverse_mass = flat(push.direction, 0, n), flat(model.inverse_mass, 0, n)
     course = x, v_star, direction, inverse_mass, real(boundary.dt), real(boundary.dt * push.factor)
-    predicted_gap = flat(contacts.predicted_gap, first, last)
+    predicted_gap = flat(contacts.predicted_gap, 0, n)
     for i in range(predicted_gap.shape[0]):
         predicted_gap[i] = math.inf
     for o in range(boundary.radius.shape[0]):

@@ -8,7 +8,6 @@ from massspring.kernels.forces.springs import SHORTEST
 from massspring.kernels.fused.chunk import AREA, FORCE, HERE, LANES, RESULT, SHARE, SPEED, SUMS, put, take, total
 from massspring.kernels.fused.long_rows import add_walls, join_pieces
 from massspring.kernels.jit.decorators import njit_inlined
-from massspring.kernels.jit.thread_team import JOB_SPRINGS, JOB_SPRINGS_AND_VOLUME, fork, join
 from massspring.kernels.jit.vectors import at_least, gather, lanes_of, load, root, save, spread
 
 
@@ -152,8 +151,8 @@ def keep_held(slices, s, force, tile):
 
 
 @njit_inlined
-def pass_slices(nodes, work, boundary, slices, part, keeps, tile):
-    """v* and G of the slices first ≤ s < last in `part`, with their contributions to 18 V, G·v* and G·W·G in `sums`.
+def pass_slices(nodes, work, boundary, slices, keeps):
+    """v* and G of all slices, with their contributions to 18 V, G·v* and G·W·G in `sums`.
 
     For slices of pieces only f and 6 G.
     """
@@ -165,9 +164,10 @@ def pass_slices(nodes, work, boundary, slices, part, keeps, tile):
         real(boundary.dt * boundary.gravity[2]),
     )
     padded, pulled, sums, v_star, gradient = work.padded_positions, work.pulled, work.sums, nodes.v_star, nodes.gradient
+    tile = work.tile
     shortest = real(SHORTEST)
     o = padded[slices.origin, 0], padded[slices.origin, 1], padded[slices.origin, 2]
-    for s in range(part[0], part[1]):
+    for s in range(slices.lanes.shape[0]):
         sums[s, 0] = gather_slice(padded, slices, s, keeps, shortest, o, tile)
         if s < slices.pieces:
             for entry in range(RESULT):
@@ -183,18 +183,7 @@ def pass_slices(nodes, work, boundary, slices, part, keeps, tile):
 
 
 @njit_inlined
-def pass_all(nodes, work, boundary, slices, keeps, team):
-    """`pass_slices` of all slices, by as many threads as there are."""
-    if team is None:
-        pass_slices(nodes, work, boundary, slices, (0, slices.lanes.shape[0]), keeps, work.tile[0])
-    else:
-        fork(team, JOB_SPRINGS_AND_VOLUME if keeps else JOB_SPRINGS, 0, 0.0)
-        pass_slices(nodes, work, boundary, slices, (team.slices[0], team.slices[1]), keeps, work.tile[0])
-        join(team)
-
-
-@njit_inlined
-def predict_from_places(model, nodes, work, boundary, keeps, team):
+def predict_from_places(model, nodes, work, boundary, keeps):
     """v* of eq. 3.1 and, where a volume is kept, G of all nodes; returns V [m³], G·v* [m³/s], G·W·G [m⁴/kg].
 
     `padded_positions` holds the positions. Only the forces on held nodes are stored.
@@ -203,7 +192,7 @@ def predict_from_places(model, nodes, work, boundary, keeps, team):
     walls = model.membrane.triangles.shape[0] > 0
     if walls:
         nodes.force[:] = 0
-    pass_all(nodes, work, boundary, slices, keeps, team)
+    pass_slices(nodes, work, boundary, slices, keeps)
     join_pieces(model, nodes, work, boundary, keeps)
     volume, flow, mobility = add_up(work.sums, slices.pieces)
     if walls:

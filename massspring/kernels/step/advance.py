@@ -5,19 +5,17 @@ from massspring.kernels.contact.modes import FREE
 from massspring.kernels.fused.padded import pad_positions
 from massspring.kernels.jit.decorators import njit_exposed, njit_inlined
 from massspring.kernels.jit.flat import flat
-from massspring.kernels.jit.thread_team import JOB_MOVE, fork, join
 
 NEAR = 4096
-"""Nodes per block, so that the data of the end of a step fits the second-level cache."""
+"""Nodes per block: new positions are padded while they are still in the second-level cache."""
 
 
 @njit_inlined
-def advance_nodes(nodes, contacts, work, inverse_mass, push, dt, part):
-    """v⁺ = ṽ + dt W̃ f, x⁺ = x + dt v⁺ (eq. 3.5) of the nodes first ≤ i < last in `part`.
+def advance_nodes(nodes, contacts, work, inverse_mass, push, dt, first, last):
+    """v⁺ = ṽ + dt W̃ f, x⁺ = x + dt v⁺ (eq. 3.5) of the nodes first ≤ i < last.
 
     `padded_positions` holds x at the start of the step.
     """
-    first, last = part
     flat_x, flat_v = flat(nodes.x, first, last), flat(nodes.v, first, last)
     flat_v_star, direction = flat(nodes.v_star, first, last), flat(push.direction, first, last)
     weights, mode, real = flat(inverse_mass, first, last), contacts.mode, nodes.x.dtype.type
@@ -40,28 +38,10 @@ def advance_nodes(nodes, contacts, work, inverse_mass, push, dt, part):
 @njit_exposed
 def advance(frame, push):
     """The end of a step of all nodes (eq. 3.5); adds the impulse of each obstacle and pads the new positions."""
-    model, nodes, contacts, dt = frame.model, frame.nodes, frame.contacts, frame.boundary.dt
+    model, nodes, contacts, work, dt = frame.model, frame.nodes, frame.contacts, frame.work, frame.boundary.dt
     book_contacts(model, nodes, contacts, push, dt, frame.diagnostics.contact_impulse)
-    move_all(frame, push, frame.team)
-
-
-@njit_inlined
-def move_all(frame, push, team):
-    """`move` of all nodes, by as many threads as there are."""
-    if team is None:
-        move(frame, push, 0, frame.nodes.x.shape[0])
-    else:
-        fork(team, JOB_MOVE, 0, push.factor)
-        move(frame, push, team.nodes[0], team.nodes[1])
-        join(team)
-
-
-@njit_inlined
-def move(frame, push, first, last):
-    """`advance_nodes` and `pad_positions` of some nodes; `NEAR` at a time, so that the new positions are still in the
-    cache."""
-    nodes, work, weights = frame.nodes, frame.work, frame.model.inverse_mass
-    for begin in range(first, last, NEAR):
-        end = min(begin + NEAR, last)
-        advance_nodes(nodes, frame.contacts, work, weights, push, frame.boundary.dt, (begin, end))
+    n = nodes.x.shape[0]
+    for begin in range(0, n, NEAR):
+        end = min(begin + NEAR, n)
+        advance_nodes(nodes, contacts, work, model.inverse_mass, push, dt, begin, end)
         pad_positions(nodes, work, begin, end)

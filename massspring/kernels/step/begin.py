@@ -22,7 +22,7 @@ def begin_step(frame, step, keeps):
     Returns V [m³] and G·W·G [m⁴/kg].
     """
     model, nodes, boundary = frame.model, frame.nodes, frame.boundary
-    volume, _, mobility = predict_from_places(model, nodes, frame.work, boundary, keeps, frame.team)
+    volume, _, mobility = predict_from_places(model, nodes, frame.work, boundary, keeps)
     end_stage(frame.diagnostics.stage_times, SPRINGS)
     held = boundary.held_displacement[step]
     prescribe_velocity_into(
@@ -36,7 +36,7 @@ def begin_step(frame, step, keeps):
 def begin_summed_step(frame, step):
     """`begin_step` with G, which also sums G·v* [m³/s] over all nodes in the same pass: (V, G·v*, G·W·G)."""
     model, nodes, boundary = frame.model, frame.nodes, frame.boundary
-    volume, flow, mobility = predict_from_places(model, nodes, frame.work, boundary, True, frame.team)
+    volume, flow, mobility = predict_from_places(model, nodes, frame.work, boundary, True)
     end_stage(frame.diagnostics.stage_times, SPRINGS)
     flow += prescribe(model, nodes, boundary.held_displacement[step], boundary.dt)
     end_stage(frame.diagnostics.stage_times, HELD)
@@ -49,7 +49,7 @@ def search_contacts(frame, step, push):
     take."""
     if frame.boundary.radius.shape[0] == 0:
         return 1
-    find_contacts(frame.model, frame.nodes, frame.contacts, frame.boundary, step, push, frame.team)
+    find_contacts(frame.model, frame.nodes, frame.contacts, frame.boundary, step, push)
     end_stage(frame.diagnostics.stage_times, SEARCH)
     return CONTACT_PASSES
 

@@ -4,7 +4,6 @@ from typing import NamedTuple
 
 from massspring.kernels.arrays.layout import BoundaryConditions, Contacts, FrameDiagnostics, Model, Nodes, Workspace
 from massspring.kernels.jit.by_address import by_address
-from massspring.kernels.jit.thread_team import ThreadTeam
 from massspring.kernels.probe.arrays import Probing
 
 
@@ -20,5 +19,3 @@ class Frame(NamedTuple):
     diagnostics: FrameDiagnostics
     probing: Probing | None = None
     """Thin probes, or None; with None the loop is compiled without their stage."""
-    team: ThreadTeam | None = None
-    """Threads that share the longest loops; None for one thread. Only the loops are compiled again for threads."""

@@ -71,7 +71,6 @@ SETUPS = {
     "550 surface nodes, free": lambda: squeezed(ms.Free()),
     f"{LARGE} surface nodes": probed,
     f"{LARGE} surface nodes, float32": lambda: replace(probed(), precision="float32"),
-    f"{LARGE} surface nodes, two threads": lambda: replace(probed(), threads=2),
     "128 volumes": lambda: volumes(128),
     "one volume per node": lambda: volumes(None),
     "thin probe, refined stomach": slide,

@@ -19,18 +19,16 @@ from massspring import (
     step_limit,
 )
 from massspring.body.body import NO_FACETS
-from massspring.layout.threads import shared
 from massspring.methods import VARIANTS
 from massspring.run.precision import Precision
 from massspring.world.surroundings import Surroundings
 from studies.sweep.compiling.bodies import EDGE, KINDS, tiny_body
 
 FRAMES, STEPS = 2, 2
-PLAIN, PROBE, THREADS = "", "thin probe", "threads"
+PLAIN, PROBE = "", "thin probe"
 OWN_TYPES = ("whole", "several", "quadratic")
 """Kinds of bodies whose types are not those of another. Options are compiled for them in double precision, of a method
-that keeps nothing for one of them; threads in single precision for one volume alone. The rest is compiled when it is
-asked for."""
+that keeps nothing for one of them. The rest is compiled when it is asked for."""
 
 
 @dataclass(frozen=True)
@@ -75,13 +73,11 @@ def variants_of(method: Method) -> Iterator[Variant]:
         if method.why_not(tiny_body(kind)) is not None:
             continue
         thin_probes = table.thin_probes and kind != "quadratic"  # beside which they are refused
-        supported = {PROBE: thin_probes, THREADS: table.threads}
         own = kind == "whole" if table.keeps == "none" else kind in OWN_TYPES or table.keeps == "elements"
         for precision in precisions:
             yield Variant(method, kind, precision)
-            for option, yes in supported.items() if own else ():
-                if yes and (precision == "float64" or (option == THREADS and kind == "whole")):
-                    yield Variant(method, kind, precision, option)
+        if own and thin_probes:
+            yield Variant(method, kind, option=PROBE)
 
 
 def family(method: Method) -> str:
@@ -99,13 +95,7 @@ def _rank(method: Method) -> int:
 
 def advance(variant: Variant) -> None:
     """Some frames of the variant: a plane presses the body, which is held below; a rough one where the method can."""
-    setup = setup_of(variant)
-    if variant.option != THREADS:
-        simulate(setup)
-        return
-    state = shared(setup.start(), 2)  # asked for by name, whatever the number of cores
-    for frame in range(FRAMES):
-        state = setup.method.advance(state, setup.boundary(frame))
+    simulate(setup_of(variant))
 
 
 def setup_of(variant: Variant) -> Setup:

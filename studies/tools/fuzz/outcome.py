@@ -12,7 +12,7 @@ from studies.base.errors import StudyError
 from studies.tools.fuzz.choices import Choices
 from studies.tools.fuzz.surroundings import setup_of
 from studies.tools.fuzz.trial import Trial
-from studies.tools.fuzz.truths import broken, named, other_bits
+from studies.tools.fuzz.truths import broken, named
 
 UNEXPLAINED = "unexplained"
 SECONDS = 20.0
@@ -63,7 +63,7 @@ def _run(trial: Trial) -> tuple[str, str]:
     history = simulate(setup, time_limit=SECONDS)
     if history.outcome != "finished":
         return history.outcome, history.message
-    wrong = broken(setup, history) or other_bits(setup, history)
+    wrong = broken(setup, history)
     return (UNEXPLAINED, wrong) if wrong else named(setup, history)
 
 

@@ -70,7 +70,6 @@ def setup_of(trial: Trial) -> Setup:
         targets=_targets(trial, body, clock),
         positions=start.positions(body.rest) if start.shaped else None,
         precision="float32" if trial.precision == "float32" else "float64",
-        threads=trial.threads,
     )
 
 

@@ -21,7 +21,6 @@ CHOICES: dict[str, tuple[Any, ...]] = {
     "friction": (0.0, 0.0, 0.5, "no_slip"),
     "held": (False, True),
     "precision": ("float64", "float64", "float32"),
-    "threads": (1, 1, 1, 2),
 }
 """What is drawn evenly; a choice that stands there twice is drawn twice as often."""
 WITHOUT_LENGTH = ("cotangent", "edge_smoothed")
@@ -75,7 +74,6 @@ class Trial(Choices):
     damping: float = 0.0
     """Over the largest frequency of the springs."""
     precision: str = "float64"
-    threads: int = 1
 
 
 def draw(seed: int, number: int) -> Trial:
@@ -102,7 +100,7 @@ def draw(seed: int, number: int) -> Trial:
     if rng.random() > UNFIT:
         drawn |= _fitted(drawn, rng)
     if rng.random() < 1.0 / ONE_IN:
-        drawn |= {"steps": LONG, "shape": "cell", "kind": LINEAR, "start": "rest", "load": "none", "threads": 1}
+        drawn |= {"steps": LONG, "shape": "cell", "kind": LINEAR, "start": "rest", "load": "none"}
     return Trial(seed, number, **drawn)
 
 
@@ -119,7 +117,6 @@ def _fitted(drawn: dict[str, Any], rng: np.random.Generator) -> dict[str, Any]:
         volumes, law = "nodal", _one(rng, WITHOUT_LENGTH)
     choices: dict[str, Any] = {"kind": kind, "volumes": volumes, "law": law}
     choices |= {} if able.float32 and kind != QUADRATIC else {"precision": "float64"}
-    choices |= {} if able.threads else {"threads": 1}
     choices |= {} if able.targets else {"target": 1.0}
     if drawn["load"] == "probe" and (not able.thin_probes or kind == QUADRATIC):
         choices["load"] = "sphere"

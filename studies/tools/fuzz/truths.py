@@ -1,10 +1,8 @@
 """What must hold at the end of a run that says it is finished; measured from its positions, not from its records."""
 
-from dataclasses import replace
-
 import numpy as np
 
-from massspring import History, Probe, Setup, simulate
+from massspring import History, Probe, Setup
 from studies.geometry.mesh.organ_mesh import signed_volume
 
 DRIFT = 0.01
@@ -34,15 +32,6 @@ def broken(setup: Setup, history: History) -> str | None:
     return (
         _not_finite(history) or _wrong_volume(setup, history) or _moved_hold(setup, history) or _inside(setup, history)
     )
-
-
-def other_bits(setup: Setup, history: History) -> str | None:
-    """Whether one thread gives another result than several."""
-    if setup.threads == 1:
-        return None
-    alone = simulate(replace(setup, threads=1))
-    same = np.array_equal(alone.final, history.final) and alone.outcome == history.outcome
-    return None if same else f"{setup.threads} threads give different positions from one"
 
 
 def _not_finite(history: History) -> str | None:

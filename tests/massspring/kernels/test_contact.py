@@ -208,7 +208,7 @@ def test_looking_only_at_near_nodes_changes_no_bit(ball_body):
             nodes, push = state.nodes, Push(state.nodes.gradient, state.lam[0])
             near, far = (_copied(state.contacts) for _ in range(2))
             for contacts in (near, far):
-                find_contacts(net, nodes, contacts, boundary, 0, push, None)
+                find_contacts(net, nodes, contacts, boundary, 0, push)
             lam = factor * state.lam[0]
             mobility = float((net.inverse_mass[:, None] * nodes.gradient**2).sum())
             reach = pressure_reach(lam - state.lam[0], mobility, lightest, dt)

@@ -86,7 +86,7 @@ class Scene:
 
     def find(self, lam: float = LAM) -> "Scene":
         push = Push(self.state.nodes.gradient, lam)
-        find_contacts(self.model, self.state.nodes, self.contacts, self.boundary, 0, push, None)
+        find_contacts(self.model, self.state.nodes, self.contacts, self.boundary, 0, push)
         return self
 
     def revise(self, lam: float, earlier: float = LAM) -> int:

@@ -126,7 +126,6 @@ REQUESTS = {
         {"pairs": np.zeros((0, 2), dtype=int)},
         "method '{}' does not support contact between the faces of a cut: {};",
     ),
-    "threads": ({"threads": 2}, "method '{}' runs on one thread, {};"),
     "float32": ({"precision": "float32"}, "method '{}' runs in float64 only, {};"),
     "events": ({"events": ()}, "method '{}' supports no body that changes in a run: {}"),
 }
@@ -135,8 +134,7 @@ REQUESTS = {
 
 @EACH
 @pytest.mark.parametrize("option", REQUESTS)
-def test_an_option_runs_or_is_refused_with_the_sentence_of_the_table(method, option, request, monkeypatch):
-    monkeypatch.setattr("massspring.run.checks.cores", lambda: 2)
+def test_an_option_runs_or_is_refused_with_the_sentence_of_the_table(method, option, request):
     options, sentence = REQUESTS[option]
     body = block_for(method, request)
     if "targets" in options:

@@ -22,9 +22,8 @@ from massspring import (
     step_limit,
 )
 from massspring.kernels.arrays.layout import Accuracy
-from massspring.layout.threads import cores
 from massspring.methods.families.points import point_volumes_frame
-from massspring.methods.method import threaded_frame
+from massspring.methods.method import begin_frame
 from massspring.run import renumber
 from tests.massspring.conftest import SOFT
 from tests.massspring.methods import test_methods as contract
@@ -72,9 +71,9 @@ def test_the_contract_holds_with_a_lumen(promise, hollow):
 
 def with_pressures_that_stay(state, boundary):
     """One frame without a solve: the springs, the local term and mu in every volume, as `stiffness_at_rest` has it."""
-    with threaded_frame(state, boundary) as after:
-        after.rows.lam[:] = after.model.rest_lam
-        point_volumes_frame(after.frame(boundary), after.rows, None, Accuracy(1e-6, 0), None)
+    after = begin_frame(state, boundary)
+    after.rows.lam[:] = after.model.rest_lam
+    point_volumes_frame(after.frame(boundary), after.rows, None, Accuracy(1e-6, 0), None)
     return after
 
 
@@ -176,15 +175,6 @@ def test_the_order_of_nodes_does_not_matter(monkeypatch):
     history = simulate(plain)
     assert np.abs(history.final - inside.final).max() < 1e-10 * body.size
     assert np.allclose(history.contact_force, inside.contact_force, atol=1e-6 * np.abs(history.contact_force).max())
-
-
-@pytest.mark.skipif(cores() < 2, reason="this process may use one core")
-def test_two_threads_give_the_same_bits():
-    body = quadratic_body(*ball_mesh(), SOFT)
-    clock = clock_for(body, 3, 10)
-    setup = Setup(body, ImplicitVolume(), clock, squeeze(body, 0.002, clock.duration), damping=20.0)
-    one, two = (simulate(replace(setup, threads=threads)) for threads in (1, 2))
-    assert np.array_equal(one.final, two.final) and np.array_equal(one.pressure, two.pressure)
 
 
 OTHERS = [method() for method in METHODS if not method.capabilities.point_volumes]

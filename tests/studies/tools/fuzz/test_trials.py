@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from massspring import Free, MassSpringError, simulate
-from massspring.layout.threads import cores
 from massspring.methods.implicit_volume import ImplicitVolume
 from studies.geometry.mesh.organ_mesh import tetrahedron_volumes
 from studies.tools.fuzz import outcome as module
@@ -14,7 +13,7 @@ from studies.tools.fuzz.bodies import body_of, mesh_of
 from studies.tools.fuzz.outcome import UNEXPLAINED, simplest, tried
 from studies.tools.fuzz.surroundings import setup_of
 from studies.tools.fuzz.trial import CHOICES, Trial, draw
-from studies.tools.fuzz.truths import broken, named, other_bits
+from studies.tools.fuzz.truths import broken, named
 
 CALM = Trial(seed=0, number=0, method="implicit_volume")
 
@@ -103,15 +102,6 @@ def test_each_truth_is_missed_by_what_breaks_it(pressed):
     assert named(setup, replace(deep, **upright))[0] == "penetrated"
     assert named(setup, replace(history, volume=1.1 * history.volume, **upright))[0] == "drifted"
     assert named(setup, replace(history, min_j=history.min_j * 0.0))[0] == "inverted"
-
-
-@pytest.mark.skipif(cores() < 2, reason="one core")
-def test_threads_are_compared_bit_for_bit(pressed, monkeypatch):
-    setup, history = pressed
-    assert other_bits(setup, history) is None
-    two = replace(setup, threads=2)
-    assert other_bits(two, history) is None
-    assert "2 threads" in str(other_bits(two, replace(history, final=history.final * (1 + 1e-15))))
 
 
 def test_a_failure_is_reduced_to_the_choices_that_matter():
