@@ -243,7 +243,7 @@ def test_events_that_cannot_be_are_refused():
     refused(cut.setup, "moves no node", events=(replace(event, body=moved),))
     heavier = replace(event.body, mass=2.0 * event.body.mass)
     refused(cut.setup, "do not add up to its mass", events=(replace(event, body=heavier),))
-    refused(cut.setup, "float64, by one thread", precision="float32")
+    refused(cut.setup, "in float64 and without", precision="float32")
     uniform = [body_of_cells(*mesh, "uniform") for mesh in ((cut.points, cut.cells), (event.body.rest, cut.opened))]
     refused(
         cut.setup,

@@ -320,7 +320,7 @@ def test_pairs_that_cannot_be_are_refused():
     setup = halves.setup(body, True)
     with pytest.raises(MassSpringError, match="2 nodes on a cut are attached and their copies are not"):
         replace(setup, attachments=(Attachment(pairs[:2, 0]),))
-    with pytest.raises(MassSpringError, match="float64, by one thread"):
+    with pytest.raises(MassSpringError, match="in float64 and without"):
         replace(setup, precision="float32")
     for wrong, sentence in (
         (pairs[:, [0, 0]], "name a node twice"),
