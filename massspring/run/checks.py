@@ -184,8 +184,7 @@ def check_face_pairs(
         )
     if precision != "float64" or probes:
         raise MassSpringError(
-            "faces of a cut that may touch are advanced in float64 and without thin probes; "
-            "leave these out"
+            "faces of a cut that may touch are advanced in float64 and without thin probes; leave these out"
         )
     held = np.isin(np.asarray(pairs), np.concatenate([[], *(np.asarray(a.nodes) for a in attachments)]))
     alone = int((held.sum(axis=1) == 1).sum())

@@ -100,17 +100,14 @@ def kept_momentum(v: np.ndarray, x: np.ndarray, mass: np.ndarray, growth: Growth
     return kept
 
 
-def check_events(
-    events: tuple[Event, ...], frames: int, method: Method, precision: str, probes: bool
-) -> None:
+def check_events(events: tuple[Event, ...], frames: int, method: Method, precision: str, probes: bool) -> None:
     """Raises MassSpringError for events that this run cannot have."""
     supported = method.capabilities.events
     if isinstance(supported, No):
         raise MassSpringError(f"method '{method.name}' supports no body that changes in a run: {supported.because}")
     if precision != "float64" or probes:
         raise MassSpringError(
-            "a body that changes in a run is advanced in float64 and without thin probes; "
-            "leave these out"
+            "a body that changes in a run is advanced in float64 and without thin probes; leave these out"
         )
     at = [event.frame for event in events]
     if at[0] < 1 or at[-1] >= frames or (np.diff(at) <= 0).any():
