@@ -107,7 +107,8 @@ def test_a_method_that_does_not_apply_and_what_has_not_ended_are_no_failure():
     fine = [standing(status, "") for status in ("ok", "skipped", "stale", "missing")]
     bad = [standing(status, "") for status in Status if status not in ("ok", "skipped")]
     assert unexpected(study, [*fine, *bad]) == bad
-    reference = Standing(ReferenceJob(Path(__file__), "tiny", ReferenceSolve(SQUEEZE)), "not-converged", "")
+    scene = replace(SQUEEZE, reference=ReferencePlan("octant", (0.9, 0.5), variants=()))
+    reference = Standing(ReferenceJob(Path(__file__), "tiny", ReferenceSolve(scene)), "not-converged", "")
     assert unexpected(replace(study, expects=tuple(Status)), [reference]) == [reference]
 
 
