@@ -126,7 +126,11 @@ ACCURACY = Study(
             *element_cases(scene),
         )
     ),
-    charts=(Chart("accuracy.png", "studies.plots.work_precision:draw"),),
+    charts=(
+        Chart("accuracy.png", "studies.plots.work_precision:draw"),
+        Chart("overview.png", "studies.plots.overview:draw"),
+        Chart("liver_probe.png", "studies.plots.probe:draw"),
+    ),
     columns=(
         "force_end",
         "mean_error",

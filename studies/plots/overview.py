@@ -1,59 +1,62 @@
-"""Error of the force against speed for three bodies in every scene: the chart of README."""
+"""The result in one chart: the error of the force against speed, of three kinds of bodies in every scene."""
 
 from collections.abc import Sequence
 
 import numpy as np
-import pandas as pd
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from studies.base.counting import readable
-from studies.plots.style.page import finish, page, panels
-from studies.plots.style.style import GREY, NORMAL, drawing, styled
+from studies.metrics.metric import COMPARABLE
+from studies.metrics.metrics import force_end, real_time
+from studies.metrics.run import Run
+from studies.plots.style.page import blank, finish, page, panels
+from studies.plots.style.style import BLACK, GREEN, GREY, NORMAL, VERMILLION, drawing, styled
 
-TITLE = "How accurate, how fast: three bodies in the scenes whose force is known"
-FORCE, SPEED = "force_end [%]", "real_time [s/s]"
-PAPER, ONE = "surface", "tetrahedral"
-COLOURS = {"the paper's body": "#0072B2", "one kept volume": "#D55E00", "quadratic, masses by stiffness": "#009E73"}
-MARKERS = "osD^vP*X"
+TITLE = "Error of the force against speed"
+KINDS = {"surface": BLACK, "tetrahedral": VERMILLION, "quadratic": GREEN}
+NAMES = {"surface": "the paper's body", "tetrahedral": "one kept volume", "quadratic": "quadratic, a volume per vertex"}
+MARKERS = "osD^vPXp<"
 SMALLEST = 0.05
-"""Errors below are drawn there [%]: the references know no force better."""
+"""Smaller errors are drawn here [%]: no reference knows a force better."""
+Point = tuple[str, str, float, float]
+"""Kind of body, scene, simulated over computing time [s/s], error of the force at full load [%]."""
+
+
+def figure(runs: Sequence[Run]) -> Figure:
+    """A marker for each timed body that has a reference: all sizes, none chosen by its error."""
+    return figure_of([p for run in runs if (p := _point(run)) is not None])
+
+
+def _point(run: Run) -> Point | None:
+    body = run.case.body
+    shown = body.kind in KINDS and body.volumes == "scene" and run.case.method.name == "implicit_volume"
+    if not shown or run.timing is None or run.reference is None or run.record.status not in COMPARABLE:
+        return None
+    return body.kind, run.case.scene.name, real_time(run), force_end(run)
 
 
 @styled
-def figure(table: pd.DataFrame) -> Figure:
-    """table: the published table of the study `accuracy`, a row for each case; timed rows are shown."""
-    table = table[(table["method"] == "implicit_volume") & (table["status"] == "ok")]
-    table = table.dropna(subset=[FORCE, SPEED])
-    scenes = list(dict.fromkeys(table["scene"]))
-    sheet = page(8.0, 4.6)
+def figure_of(points: Sequence[Point]) -> Figure:
+    """The chart of points; those whose error or speed is not known are left out."""
+    points = [point for point in points if np.isfinite(point[2:]).all()]
+    if not points:
+        return blank(TITLE, "no timed run with a reference has finished yet")
+    scenes = dict(zip(dict.fromkeys(point[1] for point in points), MARKERS * 9, strict=False))
+    sheet = page(8.0, 4.4)
     axes = panels(sheet, 1, 1)[0][0]
-    for name, colour in COLOURS.items():
-        for scene, marker in zip(scenes, MARKERS, strict=False):
-            row = _row(table[table["scene"] == scene], name)
-            if row is not None:
-                error = max(abs(row[FORCE]), SMALLEST)
-                axes.plot(row[SPEED], error, marker, color=colour, markersize=7, markeredgecolor="white")
+    for kind, scene, speed, error in points:
+        height = max(abs(error), SMALLEST)
+        axes.plot(speed, height, scenes[scene], color=KINDS[kind], markersize=7, markeredgecolor="white", alpha=0.85)
+    axes.set(xscale="log", yscale="log", ylim=(0.8 * SMALLEST, 2000))
     axes.axvline(1.0, color=GREY, linewidth=1)
-    axes.text(1.04, 900, "real time", color=GREY, size=NORMAL - 1, va="top")
-    axes.axhline(3.0, color=GREY, linewidth=1, linestyle=(0, (1, 2)))
-    axes.text(0.02, 3.0, " 3 %", color=GREY, size=NORMAL - 1, va="bottom", transform=axes.get_yaxis_transform())
-    axes.set(xscale="log", yscale="log", ylim=(SMALLEST * 0.8, 1000))
-    axes.set_xlabel("simulated time over computing time, one core [s/s]")
-    axes.set_ylabel("error of the force at full load [%]")
-    handles = [Line2D([], [], color=c, marker="s", linestyle="", label=n) for n, c in COLOURS.items()]
-    handles += [
-        Line2D([], [], color=GREY, marker=m, linestyle="", label=readable(s)) for s, m in zip(scenes, MARKERS, strict=False)
-    ]
-    return finish(sheet, TITLE, handles, ["Of each kind the finest body that was timed."])
-
-
-def _row(rows: pd.DataFrame, name: str) -> "pd.Series | None":
-    """The finest timed body of a kind."""
-    body = rows["body"]
-    chosen = {"the paper's body": body == PAPER, "one kept volume": body == ONE}.get(name, body.str.endswith(name))
-    rows = rows[chosen].sort_values("nodes")
-    return None if rows.empty else rows.iloc[-1]
+    axes.text(1.05, 1500, "real time", color=GREY, size=NORMAL, va="top")
+    axes.set_xlabel("simulated over computing time, one core [s/s]")
+    axes.set_ylabel("error of the force [%]")
+    there = [kind for kind in KINDS if any(point[0] == kind for point in points)]
+    handles = [Line2D([], [], color=KINDS[kind], marker="s", linestyle="", label=NAMES[kind]) for kind in there]
+    handles += [Line2D([], [], color=GREY, marker=m, linestyle="", label=readable(s)) for s, m in scenes.items()]
+    return finish(sheet, TITLE, handles, ["At full load, every size that was timed; a scene has a marker."])
 
 
 draw = drawing(figure)

@@ -1,6 +1,6 @@
 """What stands in a results file: every field and attribute with shape, kind, unit and description, in one table.
 
-Writers, the reader's check, docs/results.md and the tests take it from here.
+Writers, the reader's check and the tests take it from here.
 """
 
 from enum import StrEnum
@@ -214,22 +214,3 @@ LAYOUTS: dict[str, tuple[dict[str, FieldSpec], dict[str, AttributeSpec]]] = {
     "timing": (TIMING_FIELDS, TIMING_ATTRIBUTES),
 }
 """Kind of a record -> its fields and attributes. A record of another kind is not checked."""
-
-
-def tables() -> str:
-    """The tables of docs/results.md in Markdown."""
-    parts = []
-    for kind, (fields, attributes) in LAYOUTS.items():
-        parts += [f"### {kind}", "", "| dataset | shape | unit | |", "|---|---|---|---|"]
-        for name, spec in fields.items():
-            optional = " (optional)" if spec.optional else ""
-            parts.append(
-                f"| {name} | ({', '.join(spec.shape.split())}) | {spec.unit or 'text'} | {spec.description}{optional} |"
-            )
-        parts += ["", "| attribute | unit | |", "|---|---|---|"]
-        parts += [f"| {name} | {spec.unit or 'text'} | {spec.description} |" for name, spec in attributes.items()]
-        parts.append("")
-    parts += ["| letter | number of |", "|---|---|"]
-    parts += [*(f"| {letter} | {what} |" for letter, what in LENGTHS.items()), ""]
-    parts += ["| status | |", "|---|---|", *(f"| `{status}` | {what} |" for status, what in STATUSES.items())]
-    return "\n".join(parts)

@@ -13,17 +13,12 @@ from studies.runs.run import OWN_FILES
 from studies.store.faults import fault
 from studies.store.new_record import new_fields
 from studies.store.record import read_record
-from studies.store.schema import LAYOUTS, LENGTHS, REFERENCE_FIELDS, RUN_FIELDS, STATUSES, Status, tables
+from studies.store.schema import LAYOUTS, LENGTHS, REFERENCE_FIELDS, RUN_FIELDS, STATUSES, Status
 from tests.studies import made_up_run
 from tests.studies.tiny import tiny_case
 
 REPOSITORY = Path(__file__).parents[3]
 BY_NAME = re.compile(r"""\.field\(\s*"(\w+)"\s*\)|\.fields\["(\w+)"\]|(?:run|self)\.fields\.(\w+)""")
-
-
-def test_the_document_shows_the_tables():
-    """To bring it up to date: python -c "from studies.store.schema import tables; print(tables())"."""
-    assert tables() in (REPOSITORY / "docs" / "results.md").read_text(encoding="utf-8")
 
 
 def test_every_status_has_its_sentence():
