@@ -12,7 +12,7 @@ from matplotlib.text import Text
 from massspring import Free
 from studies.base.errors import StudyError
 from studies.catalog import STUDIES
-from studies.plots import cut_open, laws, opening, pieces, squeeze
+from studies.plots import cut_open, laws, opening, pieces, probe, squeeze
 from studies.plots.campaigns import stability
 from studies.plots.style.style import DPI, SMALL, styled
 from studies.store.record import Status
@@ -94,7 +94,7 @@ def test_axes_carry_units(chart):
         if label
     ]
     # The runs of `grid` have no cut: tests/studies/runs/test_cutting.py draws some that have.
-    assert chart in (squeeze, opening, pieces, cut_open) or labels
+    assert chart in (squeeze, opening, pieces, cut_open, probe) or labels
     assert [label for label in labels if not re.search(r"\[[^\]]+\]", label)] == []
 
 
@@ -103,7 +103,7 @@ def test_legend_and_notes_lie_below_all_panels(chart):
     figure = drawn(chart)
     lowest = min(axes.get_tightbbox().y0 for axes in figure.findobj(lambda artist: hasattr(artist, "get_ylabel")))
     below = [*figure.legends, *(text for text in figure.texts if text is not figure._suptitle)]
-    assert below or chart in (opening, pieces, cut_open)  # their runs here have no cut
+    assert below or chart in (opening, pieces, cut_open, probe)  # their runs here have no cut
     assert all(item.get_window_extent().y1 <= lowest + 1 for item in below)
     notes = [text.get_window_extent() for text in figure.texts if text is not figure._suptitle]
     assert all(legend.get_window_extent().y0 >= note.y1 - 1 for legend in figure.legends for note in notes)
