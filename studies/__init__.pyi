@@ -28,10 +28,14 @@ from .metrics.table import study_table as study_table
 from .reference.load import Reference as Reference
 from .reference.load import reference_for as reference_for
 from .reference.solved import solve_reference as solve_reference
-from .runs.case import BodyRecipe as BodyRecipe
 from .runs.case import Case as Case
 from .runs.prepare import Prepared as Prepared
 from .runs.prepare import prepare as prepare
+from .runs.recipes import BodyRecipe as BodyRecipe
+from .runs.recipes import MembraneBody as MembraneBody
+from .runs.recipes import QuadraticBody as QuadraticBody
+from .runs.recipes import SurfaceBody as SurfaceBody
+from .runs.recipes import TetrahedralBody as TetrahedralBody
 from .runs.run import measure as measure
 from .runs.user_code import own_law as own_law
 from .scene.library import SCENES as SCENES

@@ -23,7 +23,8 @@ from studies.geometry.organs import SHAPES
 from studies.geometry.surface.first_surface import first_surface
 from studies.metrics.metrics import METRICS
 from studies.report.methods_page import methods_page
-from studies.runs.case import BodyRecipe, Case, case_from_json
+from studies.runs.case import Case, case_from_json
+from studies.runs.recipes import TetrahedralBody
 from studies.runs.run import measure
 from studies.scene.library import JUDGED, SCENES
 from studies.store.record import Status
@@ -123,7 +124,7 @@ def test_an_added_scene_keeps_the_contract(recipe, add):
     assert hold(test_scenes, "scene", scene=[scene], kind=("tetrahedral", "surface")) >= 9
     test_scenes.test_no_two_scenes_have_one_name()
     assert scene not in JUDGED
-    record = measure(Case(scene, BodyRecipe(nodes=100), frames=10))
+    record = measure(Case(scene, TetrahedralBody(nodes=100), frames=10))
     assert record.status in (Status.OK, Status.INVERTED), record.message  # so few nodes invert under their weight
     weight = scene.tissue.density * record.attributes["rest_volume"] * 9.81
     assert record.fields["contact_force"].values[-1].sum(axis=0)[2] == pytest.approx(weight, rel=0.02)
@@ -244,6 +245,6 @@ def test_an_added_law_keeps_the_contract(recipe, add):
     law = recipe("stiffness law").ADDED
     add(LAWS, law)
     assert hold(test_laws, "law", law=["bars"]) == 3
-    assert BodyRecipe(law="bars").law == "bars"
+    assert TetrahedralBody(law="bars").law == "bars"
     body = tetrahedral_body(*block((2, 2, 2)), SOFT, "bars")
     assert body.law == "bars" and body.keeping(Volumes.nodal(body)).kept.count == body.node_count

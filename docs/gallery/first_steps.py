@@ -8,9 +8,9 @@
 # %%
 import matplotlib.pyplot as plt
 
-from studies import BALL_SQUEEZE, BodyRecipe, Case, Free, ImplicitVolume, Run, measure, study_table
+from studies import BALL_SQUEEZE, Case, Free, ImplicitVolume, Run, TetrahedralBody, measure, study_table
 
-body = BodyRecipe(nodes=150)
+body = TetrahedralBody(nodes=150)
 cases = [Case(BALL_SQUEEZE, body, method, frames=100) for method in (Free(), ImplicitVolume())]
 records = [measure(case) for case in cases]
 

@@ -15,7 +15,7 @@ from typing import ClassVar
 import numpy as np
 
 from massspring import Free, ImplicitVolume
-from studies import BALL_SQUEEZE, BodyRecipe, Case, Chart, Study
+from studies import BALL_SQUEEZE, Case, Chart, Study, TetrahedralBody
 
 SCENE = replace(BALL_SQUEEZE, name="squeeze", reference=None)
 
@@ -40,7 +40,9 @@ class Scaled(Free):
         return after.moved_to(middle + ratio * (after.x - middle))
 
 
-CASES = tuple(Case(SCENE, BodyRecipe(nodes=150), method, frames=100) for method in (Free(), Scaled(), ImplicitVolume()))
+CASES = tuple(
+    Case(SCENE, TetrahedralBody(nodes=150), method, frames=100) for method in (Free(), Scaled(), ImplicitVolume())
+)
 CHARTS = (Chart("volume.png", "studies.plots.volume_history:draw"), Chart("force.png", "studies.plots.force_path:draw"))
 STUDY = Study("shortcut", "Is scaling as good as a constraint?", CASES, CHARTS, ("volume_worst", "min_j"))
 

@@ -9,10 +9,10 @@
 from dataclasses import replace
 
 from massspring import Free, ImplicitVolume
-from studies import BALL_SQUEEZE, BodyRecipe, Case, Study
+from studies import BALL_SQUEEZE, Case, Study, SurfaceBody, TetrahedralBody
 
 SCENE = replace(BALL_SQUEEZE, reference=None)
-BODIES = [BodyRecipe(kind, 150) for kind in ("tetrahedral", "surface")]
+BODIES = TetrahedralBody(150), SurfaceBody(150)
 CASES = tuple(Case(SCENE, body, method, frames=50) for body in BODIES for method in (Free(), ImplicitVolume()))
 STUDY = Study("small", "What is in a results folder?", CASES, (), ("volume_worst", "min_j"))
 

@@ -5,7 +5,8 @@ from typing import Literal
 
 from massspring import ExplicitElements, ImplicitElements, ImplicitVolume
 from studies.catalog.study import Chart, Study
-from studies.runs.case import ADAPTIVE, BodyRecipe, Case, neighbours
+from studies.runs.case import Case
+from studies.runs.recipes import ADAPTIVE, BodyRecipe, QuadraticBody, SurfaceBody, TetrahedralBody, neighbours
 from studies.scene.inertia import why_inertia_matters
 from studies.scene.kind import NOT_ADAPTIVE, has_wall, load_of
 from studies.scene.library import JUDGED
@@ -18,7 +19,7 @@ FINEST = 1594
 """Nodes of an adaptive body of an organ nobody has tuned for; the accuracy study ends at three quarters of it."""
 SHORT, LONG = 0.5, 0.8
 """Steps over the stability limit: of linear bodies, and of quadratic ones."""
-COARSE = BodyRecipe(nodes=150, law="cotangent", volumes="nodal"), BodyRecipe("quadratic", 294, contact="nodes")
+COARSE = TetrahedralBody(nodes=150, law="cotangent", volumes="nodal"), QuadraticBody(294, contact="nodes")
 COARSE_STEP = 0.01
 """Bodies that implicit elements advance, and their step [s]: they are not limited by stability."""
 
@@ -39,11 +40,11 @@ def linear_bodies(scene: Scene) -> tuple[BodyRecipe, ...]:
         recipe
         for nodes in sizes
         for recipe in (
-            BodyRecipe("surface", nodes, axis=axis),
-            BodyRecipe(nodes=nodes),
-            BodyRecipe(nodes=nodes, volumes="regions", regions=nodes // share),
-            BodyRecipe(nodes=nodes, law="cotangent", volumes="nodal"),
-            BodyRecipe(nodes=nodes, law="edge_smoothed", volumes="nodal"),
+            SurfaceBody(nodes, axis=axis),
+            TetrahedralBody(nodes=nodes),
+            TetrahedralBody(nodes=nodes, volumes="regions", regions=nodes // share),
+            TetrahedralBody(nodes=nodes, law="cotangent", volumes="nodal"),
+            TetrahedralBody(nodes=nodes, law="edge_smoothed", volumes="nodal"),
         )
     )
 
@@ -62,7 +63,7 @@ def headline_case(scene: Scene) -> Case:
 def even(scene: Scene) -> tuple[BodyRecipe, ...]:
     """Quadratic bodies with elements of one size: the smallest, which is fast; all where grading changes nothing."""
     sizes = BUDGETS[:1] if graded(scene) else BUDGETS
-    return tuple(BodyRecipe("quadratic", nodes, mass=_mass(scene)) for nodes in sizes)
+    return tuple(QuadraticBody(nodes, mass=_mass(scene)) for nodes in sizes)
 
 
 def graded(scene: Scene) -> tuple[BodyRecipe, ...]:
@@ -71,7 +72,7 @@ def graded(scene: Scene) -> tuple[BodyRecipe, ...]:
     if not is_adaptive(scene) and not can_be_graded(scene):
         return ()
     way = ADAPTIVE if is_adaptive(scene) else True
-    return tuple(BodyRecipe("quadratic", nodes, graded=way, mass=_mass(scene)) for nodes in BUDGETS[1:])
+    return tuple(QuadraticBody(nodes, graded=way, mass=_mass(scene)) for nodes in BUDGETS[1:])
 
 
 def is_adaptive(scene: Scene) -> bool:

@@ -4,33 +4,34 @@ from dataclasses import replace
 
 from massspring import ImplicitVolume
 from studies.catalog.study import Chart, Study
-from studies.runs.case import VIRTUAL, BodyRecipe, Case
+from studies.runs.case import Case
+from studies.runs.recipes import VIRTUAL, BodyRecipe, QuadraticBody, SurfaceBody, TetrahedralBody
 from studies.scene.library import CUT
 from studies.scene.library.ball_bisected import BALL_BISECTED
 from studies.scene.library.ball_incised import BALL_INCISED
 from studies.scene.scene import Scene
 
 BODIES = (
-    BodyRecipe(nodes=350),
-    BodyRecipe(nodes=350, law="cotangent", volumes="nodal"),
-    BodyRecipe(nodes=700),
-    BodyRecipe("quadratic", nodes=594, mass="stiffness"),
-    BodyRecipe("quadratic", nodes=794, graded="adaptive", mass="stiffness"),
-    BodyRecipe("quadratic", nodes=994, graded="adaptive", mass="stiffness"),
+    TetrahedralBody(nodes=350),
+    TetrahedralBody(nodes=350, law="cotangent", volumes="nodal"),
+    TetrahedralBody(nodes=700),
+    QuadraticBody(nodes=594, mass="stiffness"),
+    QuadraticBody(nodes=794, graded="adaptive", mass="stiffness"),
+    QuadraticBody(nodes=994, graded="adaptive", mass="stiffness"),
 )
-PAPER = BodyRecipe("surface", nodes=350)
+PAPER = SurfaceBody(nodes=350)
 """The paper's body, which is cut in pieces alone."""
 UNFORESEEN = tuple(replace(body, cut=VIRTUAL) for body in BODIES if body.kind == "tetrahedral")
 """The same on meshes that do not know the cut."""
 ADVANCING = BODIES[1], BODIES[3], BODIES[5]
 """Of scenes whose cut advances: with one volume elements turn over next to the tip."""
 WALLS = (
-    BodyRecipe(nodes=400),
-    BodyRecipe(nodes=400, law="cotangent", volumes="nodal"),
-    BodyRecipe(nodes=700),
-    BodyRecipe("quadratic", nodes=994, mass="stiffness"),
-    BodyRecipe("quadratic", nodes=994, graded="adaptive", mass="stiffness"),
-    BodyRecipe("quadratic", nodes=1194, graded="adaptive", mass="stiffness"),
+    TetrahedralBody(nodes=400),
+    TetrahedralBody(nodes=400, law="cotangent", volumes="nodal"),
+    TetrahedralBody(nodes=700),
+    QuadraticBody(nodes=994, mass="stiffness"),
+    QuadraticBody(nodes=994, graded="adaptive", mass="stiffness"),
+    QuadraticBody(nodes=1194, graded="adaptive", mass="stiffness"),
 )
 """Of hollow organs."""
 LONG = 0.8

@@ -2,11 +2,12 @@
 
 from massspring import Free, ImplicitVolume
 from studies.catalog.study import Chart, Study
-from studies.runs.case import BodyRecipe, Case
+from studies.runs.case import Case
+from studies.runs.recipes import QuadraticBody, TetrahedralBody
 from studies.scene.library import BALL_SQUEEZE
 
-BALL = BodyRecipe("tetrahedral", 150)
-RECOMMENDED = BodyRecipe("quadratic", 594, mass="stiffness")
+BALL = TetrahedralBody(150)
+RECOMMENDED = QuadraticBody(594, mass="stiffness")
 
 DEMO = Study(
     name="demo",

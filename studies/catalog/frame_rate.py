@@ -2,17 +2,18 @@
 
 from massspring import Free, ImplicitVolume
 from studies.catalog.study import Chart, Study
-from studies.runs.case import BodyRecipe, Case
+from studies.runs.case import Case
+from studies.runs.recipes import SurfaceBody, TetrahedralBody
 from studies.scene.library.ball_squeeze import BALL_SQUEEZE
 from studies.scene.library.liver_probe import LIVER_PROBE
 
 BODIES = (
-    (BALL_SQUEEZE, BodyRecipe("surface", 550)),
-    (BALL_SQUEEZE, BodyRecipe("tetrahedral", 550)),
-    (LIVER_PROBE, BodyRecipe("surface", 550)),
-    (LIVER_PROBE, BodyRecipe("tetrahedral", 550)),
-    (BALL_SQUEEZE, BodyRecipe("surface", 2200)),
-    (BALL_SQUEEZE, BodyRecipe("tetrahedral", 2200)),
+    (BALL_SQUEEZE, SurfaceBody(550)),
+    (BALL_SQUEEZE, TetrahedralBody(550)),
+    (LIVER_PROBE, SurfaceBody(550)),
+    (LIVER_PROBE, TetrahedralBody(550)),
+    (BALL_SQUEEZE, SurfaceBody(2200)),
+    (BALL_SQUEEZE, TetrahedralBody(2200)),
 )
 
 FRAME_RATE = Study(

@@ -3,7 +3,8 @@
 from massspring import ImplicitVolume
 from massspring.body.laws import LAWS
 from studies.catalog.study import Chart, Study
-from studies.runs.case import BodyRecipe, Case
+from studies.runs.case import Case
+from studies.runs.recipes import SurfaceBody, TetrahedralBody
 from studies.scene.library.ball_squeeze import BALL_SQUEEZE
 
 NODES = (150, 300, 550)
@@ -13,7 +14,7 @@ LAWS_STUDY = Study(
     question=__doc__ or "",
     cases=(
         *(
-            Case(BALL_SQUEEZE, BodyRecipe(nodes=nodes, law=law.name, volumes=volumes), ImplicitVolume())
+            Case(BALL_SQUEEZE, TetrahedralBody(nodes=nodes, law=law.name, volumes=volumes), ImplicitVolume())
             for law in LAWS
             if law.rest_length
             for volumes in ("scene", "nodal")
@@ -21,13 +22,13 @@ LAWS_STUDY = Study(
         ),
         # Springs without length need a volume at every node.
         *(
-            Case(BALL_SQUEEZE, BodyRecipe(nodes=nodes, law=law.name, volumes="nodal"), ImplicitVolume())
+            Case(BALL_SQUEEZE, TetrahedralBody(nodes=nodes, law=law.name, volumes="nodal"), ImplicitVolume())
             for law in LAWS
             if not law.rest_length
             for nodes in NODES
         ),
         *(
-            Case(BALL_SQUEEZE, BodyRecipe("surface", nodes, weights=weights), ImplicitVolume())
+            Case(BALL_SQUEEZE, SurfaceBody(nodes, weights=weights), ImplicitVolume())
             for weights in (None, (1.0, 1.0, 1.0, 1.0))
             for nodes in NODES
         ),

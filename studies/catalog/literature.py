@@ -3,16 +3,17 @@
 from massspring import AngularSprings, ChainMail, ElasticResponse, ImplicitVolume, LinearModes
 from studies.catalog.accuracy import LONG, SHORT, headline, judged_at_rest
 from studies.catalog.study import Chart, Study
-from studies.runs.case import BodyRecipe, Case
+from studies.runs.case import Case
+from studies.runs.recipes import QuadraticBody, TetrahedralBody
 from studies.scene.kind import has_wall
 from studies.scene.scene import Scene
 from studies.store.schema import Status
 
-STRAIGHT = BodyRecipe(nodes=550)
+STRAIGHT = TetrahedralBody(nodes=550)
 """Springs on edges: what angular springs are added to, and the links of a chain mail."""
-WALL = BodyRecipe(nodes=800)
+WALL = TetrahedralBody(nodes=800)
 """The same for a hollow organ, whose coarser surface folds."""
-CURVED = BodyRecipe("quadratic", 594, contact="nodes")
+CURVED = QuadraticBody(594, contact="nodes")
 """Linear elements of linear shape would lock; obstacles meet the nodes."""
 FRAME_STEP = 0.02
 """Of what no stability limits [s]."""

@@ -13,7 +13,8 @@ from massspring import (
     XpbdNeoHookean,
 )
 from studies.catalog.study import Chart, Study
-from studies.runs.case import BodyRecipe, Case
+from studies.runs.case import Case
+from studies.runs.recipes import BodyRecipe, TetrahedralBody
 from studies.scene.library.ball_squeeze import BALL_SQUEEZE
 from studies.scene.library.liver_press import LIVER_PRESS
 
@@ -39,7 +40,7 @@ def contestants() -> tuple[Method, ...]:
 
 def body_for(method: Method) -> BodyRecipe:
     """The same mesh for all; springs without length for methods whose elements are made of them."""
-    plain = BodyRecipe(nodes=NODES)
+    plain = TetrahedralBody(nodes=NODES)
     return replace(plain, law="cotangent", volumes="nodal") if method.capabilities.keeps == "elements" else plain
 
 
@@ -53,10 +54,17 @@ METHODS_STUDY = Study(
     cases=(
         *(Case(scene, body_for(method), method, timed=True) for scene in SCENES for method in contestants()),
         # One volume per node, beside one for the whole and one per tetrahedron.
-        *(Case(scene, BodyRecipe(nodes=NODES, volumes="nodal"), timed=True) for scene in SCENES),
+        *(Case(scene, TetrahedralBody(nodes=NODES, volumes="nodal"), timed=True) for scene in SCENES),
         # No limit holds for implicit springs: what does a long step cost, and bring?
         *(
-            Case(scene, BodyRecipe(nodes=NODES), ImplicitSprings(), dt, frames=round(scene.duration / dt), timed=True)
+            Case(
+                scene,
+                TetrahedralBody(nodes=NODES),
+                ImplicitSprings(),
+                dt,
+                frames=round(scene.duration / dt),
+                timed=True,
+            )
             for scene in SCENES
             for dt in LONG
         ),

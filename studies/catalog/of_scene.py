@@ -5,7 +5,8 @@ from dataclasses import replace
 from massspring import Free, ImplicitVolume
 from studies.catalog.accuracy import FINEST, LONG, even, graded
 from studies.catalog.study import Chart, Study
-from studies.runs.case import BodyRecipe, Case
+from studies.runs.case import Case
+from studies.runs.recipes import BodyRecipe, TetrahedralBody
 from studies.scene.scene import Scene
 
 RECORDED = ("surface",)
@@ -16,8 +17,8 @@ def study_of(scene: Scene) -> Study:
     surface. The study has the name of the scene. Where the two meshes differ, neither is to be trusted; with fewer than
     FINEST nodes that they agree says too little (studies.metrics.trust)."""
     cases = (
-        Case(scene, BodyRecipe(), Free(), recorded=RECORDED),
-        Case(scene, BodyRecipe(), ImplicitVolume(), recorded=RECORDED),
+        Case(scene, TetrahedralBody(), Free(), recorded=RECORDED),
+        Case(scene, TetrahedralBody(), ImplicitVolume(), recorded=RECORDED),
         *(Case(scene, body, ImplicitVolume(), dt_fraction=LONG, recorded=RECORDED) for body in _two_meshes(scene)),
     )
     charts = (

@@ -2,7 +2,8 @@
 
 from massspring import Free, ImplicitVolume
 from studies.catalog.study import Chart, Study
-from studies.runs.case import BodyRecipe, Case
+from studies.runs.case import Case
+from studies.runs.recipes import BodyRecipe, SurfaceBody, TetrahedralBody
 from studies.scene.library import BLADDER_FILL, KIDNEY_PROBE, SPLEEN_SAG, STOMACH_PRESS, STOMACH_PROBE, Scene
 from studies.store.schema import Status
 
@@ -18,10 +19,10 @@ ORGANS = Study(
     name="organs",
     question=__doc__ or "",
     cases=(
-        *(case for scene in SOLID for case in _cases(scene, BodyRecipe(), BodyRecipe("surface"))),
+        *(case for scene in SOLID for case in _cases(scene, TetrahedralBody(), SurfaceBody())),
         # The paper's body of a bent organ has a bent axis; of a hollow one it keeps wall and content as one volume.
-        *(case for scene in HOLLOW for case in _cases(scene, BodyRecipe(), BodyRecipe("surface", axis="centre_line"))),
-        *(Case(scene, BodyRecipe(volumes="whole"), ImplicitVolume()) for scene in HOLLOW),
+        *(case for scene in HOLLOW for case in _cases(scene, TetrahedralBody(), SurfaceBody(axis="centre_line"))),
+        *(Case(scene, TetrahedralBody(volumes="whole"), ImplicitVolume()) for scene in HOLLOW),
     ),
     charts=(
         Chart("volume.png", "studies.plots.volume_history:draw"),

@@ -2,7 +2,8 @@
 
 from massspring import Free, ImplicitVolume
 from studies.catalog.study import Chart, Study
-from studies.runs.case import BodyRecipe, Case
+from studies.runs.case import Case
+from studies.runs.recipes import TetrahedralBody
 from studies.scene.library.ball_squeeze import BALL_SQUEEZE
 from studies.store.schema import Status
 
@@ -18,7 +19,7 @@ STABILITY_MAP = Study(
     cases=tuple(
         Case(
             BALL_SQUEEZE,
-            BodyRecipe("tetrahedral", 300, stiffness=factor),
+            TetrahedralBody(300, stiffness=factor),
             method,
             dt=BALL_SQUEEZE.duration / FRAMES / steps,
             frames=FRAMES,

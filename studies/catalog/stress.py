@@ -2,14 +2,15 @@
 
 from massspring import Free, ImplicitVolume, Shake
 from studies.catalog.study import Chart, Study
-from studies.runs.case import BodyRecipe, Case
+from studies.runs.case import Case
+from studies.runs.recipes import TetrahedralBody
 from studies.scene.library.stress import STRESS_SCENES
 from studies.store.schema import Status
 
 NODES = 230
 """On the surface: about 316 with those inside, as many as in docs/theory.md, section 5."""
-ONE, MANY = BodyRecipe(nodes=NODES), BodyRecipe(nodes=NODES, volumes="nodal")
-TAUT = BodyRecipe(nodes=NODES, law="cotangent", volumes="nodal")
+ONE, MANY = TetrahedralBody(nodes=NODES), TetrahedralBody(nodes=NODES, volumes="nodal")
+TAUT = TetrahedralBody(nodes=NODES, law="cotangent", volumes="nodal")
 FRACTION = 0.2
 BACK = ImplicitVolume(recovers=True)
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, cast
 from studies.base.errors import StudyError
 from studies.base.lookup import lookup
 from studies.runs.case import Case
+from studies.runs.recipes import TetrahedralBody
 from studies.scene.scene import Scene
 from studies.store.paths import readable
 from studies.store.schema import Status
@@ -166,12 +167,10 @@ def smoke_case(case: Case) -> Case:
     """A case small enough for a smoke run."""
     plan = case.scene.reference
     coarse = plan.smaller() if plan is not None else None
+    regions = min(case.body.regions, smoke_nodes(case) // 3)
+    fewer = {"regions": regions} if isinstance(case.body, TetrahedralBody) else {}
     return case.replaced(
         scene=replace(case.scene, reference=coarse),
-        body=replace(
-            case.body,
-            nodes=min(case.body.nodes, smoke_nodes(case)),
-            regions=min(case.body.regions, smoke_nodes(case) // 3),
-        ),
+        body=replace(case.body, nodes=min(case.body.nodes, smoke_nodes(case)), **fewer),
         frames=min(case.frames or case.scene.frames, SMOKE_FRAMES),
     )

@@ -2,10 +2,11 @@
 
 from massspring import Free, ImplicitVolume
 from studies.catalog.study import Chart, Study
-from studies.runs.case import BodyRecipe, Case
+from studies.runs.case import Case
+from studies.runs.recipes import SurfaceBody, TetrahedralBody
 from studies.scene.library import BALL_CLAMPED, BALL_SQUEEZE, LIVER_PRESS, LIVER_PROBE
 
-TETRAHEDRAL, SURFACE = BodyRecipe("tetrahedral"), BodyRecipe("surface")
+TETRAHEDRAL, SURFACE = TetrahedralBody(), SurfaceBody()
 REPLAYED = (BALL_SQUEEZE, LIVER_PRESS, LIVER_PROBE)
 """The scenes of which all bodies can be seen move (studies.runs.surface_frames)."""
 FINE_STEP = 0.05

@@ -1,9 +1,9 @@
 """How much accuracy does run time buy: with the paper's body, one volume, and quadratic elements?"""
 
 from massspring import ImplicitVolume
-from studies.catalog.accuracy import BUDGETS, LONG, SHORT, headline_case, linear_bodies
+from studies.catalog.accuracy import LONG, SHORT, even, headline_case, linear_bodies
 from studies.catalog.study import Chart, Study
-from studies.runs.case import BodyRecipe, Case
+from studies.runs.case import Case
 from studies.scene.library.ball_clamped import BALL_CLAMPED
 from studies.scene.library.liver_press import LIVER_PRESS
 from studies.scene.scene import Scene
@@ -13,8 +13,8 @@ def cases(scene: Scene) -> tuple[Case, ...]:
     """Of the study accuracy: the paper's body and one volume in two sizes, the coarsest even quadratic body and the
     headline."""
     plain = [body for body in linear_bodies(scene) if body.volumes == "scene"]
-    even = BodyRecipe("quadratic", BUDGETS[0], mass=headline_case(scene).body.mass)
-    chosen = [*((body, SHORT) for body in plain), (even, LONG)]
+    coarse = even(scene)[0]
+    chosen = [*((body, SHORT) for body in plain), (coarse, LONG)]
     others = [Case(scene, body, ImplicitVolume(), dt_fraction=step, timed=True) for body, step in chosen]
     return (*others, headline_case(scene))
 

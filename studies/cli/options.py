@@ -8,7 +8,8 @@ import typer
 from studies.base.errors import StudyError
 from studies.base.lookup import lookup
 from studies.catalog.study import Study
-from studies.runs.case import BodyRecipe, Case
+from studies.runs.case import Case
+from studies.runs.recipes import BODIES
 from studies.runs.user_code import methods_by_name
 from studies.sweep.find_scene import find_scene
 
@@ -28,7 +29,7 @@ def chosen_case(scene: str, method: str, body: str, nodes: int) -> Case:
     kind = lookup(body, ("tetrahedral", "quadratic", "surface"), "body")
     return Case(
         scene=chosen,
-        body=BodyRecipe(kind, nodes),  # type: ignore[arg-type]
+        body=BODIES[kind](nodes),
         method=lookup(method, methods_by_name(), "method")(),
     )
 

@@ -18,7 +18,8 @@ from studies.exchange.meshes import given_scene, reference_of
 from studies.metrics.run import Run
 from studies.metrics.timing.protocol import FrameTiming
 from studies.reference.load import Reference
-from studies.runs.case import BodyRecipe, Case
+from studies.runs.case import Case
+from studies.runs.recipes import BODIES
 from studies.scene.as_json import scene_of_key, scene_to_json
 from studies.scene.scene import Scene
 from studies.store.paths import readable, record_files, record_path
@@ -79,7 +80,7 @@ def case_of_entry(record: Record) -> Case:
     if record.attributes.get(ENTRY) is None:
         raise StudyError(f"'{record.name}' is not a result of another program")
     data = json.loads(record.key)
-    recipe = BodyRecipe(data["body"]["kind"], int(data["body"]["nodes"]))
+    recipe = BODIES[data["body"]["kind"]](int(data["body"]["nodes"]))
     return Case(scene_of_key(record.key), recipe, outside(data["method"]["name"]))
 
 

@@ -21,9 +21,9 @@ from studies.meshing.opened_mesh import opened_mesh
 from studies.meshing.quadratic_mesh import QuadraticMesh
 from studies.meshing.scene_mesh import mesh_for, patch_nodes
 from studies.reference.load import Reference
-from studies.runs.case import BodyRecipe
 from studies.runs.cutting import pieces_of
 from studies.runs.prepare import LUMEN, body_for
+from studies.runs.recipes import BodyRecipe, QuadraticBody, TetrahedralBody
 from studies.scene.scene import Scene
 from studies.store.schema import REFERENCE_FIELDS
 
@@ -110,8 +110,7 @@ class GivenMesh:
     @cached_property
     def recipe(self) -> BodyRecipe:
         """Of the body: its nodes are those of the outer surface before the cut."""
-        kind = "quadratic" if self.kind == CURVED else "tetrahedral"
-        return BodyRecipe(kind, self.outer_count)
+        return (QuadraticBody if self.kind == CURVED else TetrahedralBody)(self.outer_count)
 
     @cached_property
     def body(self) -> Body:

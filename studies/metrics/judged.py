@@ -11,7 +11,8 @@ from studies.meshing.bounds import SHAPE, SHAPE_VOLUME
 from studies.metrics.run import Run
 from studies.metrics.table import metric
 from studies.metrics.wish import Wish
-from studies.runs.case import BodyRecipe, Case, neighbours
+from studies.runs.case import Case
+from studies.runs.recipes import BodyRecipe, TetrahedralBody, neighbours
 from studies.store.record import Status
 
 NAN = float("nan")
@@ -127,7 +128,7 @@ def over_meshes(rows: Iterable[Judged]) -> list[Judged]:
 
 def _setting(one: Judged) -> str:
     """The settings of a case other than its body."""
-    return replace(one.case, body=BodyRecipe(), recorded=(), timed=False).key
+    return replace(one.case, body=TetrahedralBody(), recorded=(), timed=False).key
 
 
 def _largest(middle: Judged, members: "tuple[Judged, ...]") -> Judged:

@@ -16,7 +16,8 @@ from studies.metrics.metric import PERCENT
 from studies.metrics.metrics import contact_facets
 from studies.metrics.run import Run, by_scene
 from studies.metrics.wish import Wish, usual_wish
-from studies.runs.case import ADAPTIVE, BodyRecipe, Case
+from studies.runs.case import Case
+from studies.runs.recipes import ADAPTIVE, BodyRecipe, TetrahedralBody
 from studies.scene.kind import load_of
 from studies.scene.quantities import allowed
 from studies.scene.scene import Scene
@@ -155,7 +156,7 @@ def _pairs(runs: Sequence[Run]) -> list[tuple[Run, Run]]:
 
 
 def _without_nodes(body: BodyRecipe) -> BodyRecipe:
-    return replace(body, nodes=BodyRecipe().nodes)
+    return replace(body, nodes=TetrahedralBody().nodes)
 
 
 def _verdict(scene: str, coarse: Run, fine: Run) -> Verdict:

@@ -26,7 +26,7 @@ from studies.plots.style.page import (
     unresolved_notes,
 )
 from studies.plots.style.style import BLACK, GREY, SMALL, drawing, remark, styled
-from studies.runs.case import BodyRecipe
+from studies.runs.recipes import BodyRecipe
 from studies.store.record import Status
 
 TITLE = "Error against the reference"

@@ -31,7 +31,7 @@ from studies.plots.style.page import (
     unresolved_notes,
 )
 from studies.plots.style.style import BLACK, GREY, SMALL, drawing, styled
-from studies.runs.case import BodyRecipe
+from studies.runs.recipes import BodyRecipe
 from studies.scene.library import Scene
 
 TITLE = "Force against the reference"

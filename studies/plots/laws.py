@@ -55,7 +55,6 @@ VOLUMES = {
     "tetrahedral": ("one volume", (0, (4, 1.6)), "o"),
     "tetrahedral, one volume": ("one volume", (0, (4, 1.6)), "o"),
     "surface": ("one volume", (0, (4, 1.6)), "o"),
-    "surface, one volume": ("one volume", (0, (4, 1.6)), "o"),
     "tetrahedral, nodal volumes": ("one volume per node", "-", "^"),
 }
 """BodyRecipe.series -> (words, line, marker); other bodies take a spare look and their series as words."""

@@ -24,7 +24,7 @@ from studies.plots.style.page import (
     unresolved_notes,
 )
 from studies.plots.style.style import BLACK, GREY, save, styled
-from studies.runs.case import BodyRecipe
+from studies.runs.recipes import BodyRecipe
 
 TITLE = "Opening of the incision against the reference"
 OPENING = metric("opening_error")

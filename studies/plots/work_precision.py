@@ -16,7 +16,7 @@ from studies.metrics.wish import usual_wish
 from studies.plots.style.families import PAPER, Family, family_of
 from studies.plots.style.page import blank, finish, log_axis, page, panels, remarks, unresolved_mark, unresolved_notes
 from studies.plots.style.style import BLACK, GREEN, GREY, SMALL, drawing, remark, styled
-from studies.runs.case import BodyRecipe
+from studies.runs.recipes import BodyRecipe
 from studies.scene.scene import Scene
 from studies.store.record import Status
 

@@ -13,27 +13,6 @@ RECORDABLE = (*EXTRA, "surface")
 """Fields that a case may record on request: energies, and positions of the outer surface for a replay."""
 
 
-def check_recipe(recipe: Any) -> None:
-    """Raises StudyError for settings of a `studies.runs.case.BodyRecipe` that do not go together."""
-    quadratic = recipe.kind == "quadratic"
-    if recipe.graded and not quadratic and recipe.kind != "tetrahedral":
-        raise StudyError(f"a {recipe.kind} body cannot be graded; choose kind 'tetrahedral' or 'quadratic'")
-    if recipe.graded not in (True, False) and not quadratic:
-        raise StudyError(f"a {recipe.kind} body is not graded by a solution; choose kind 'quadratic' or graded=True")
-    if recipe.mass != "lumped" and not quadratic:
-        raise StudyError(f"a {recipe.kind} body has no masses by stiffness; choose kind 'quadratic' or mass 'lumped'")
-    if recipe.cut != "conforming" and recipe.kind != "tetrahedral":
-        raise StudyError(
-            f"a {recipe.kind} body is not cut by virtual nodes; choose kind 'tetrahedral', or leave cut out"
-        )
-    if quadratic and recipe.volumes != "scene":
-        raise StudyError(
-            f"a quadratic body keeps one volume per vertex, not volumes '{recipe.volumes}'; leave them at 'scene'"
-        )
-    if quadratic and recipe.law != "van_gelder":
-        raise StudyError(f"the springs of a quadratic body follow no law, not '{recipe.law}' either; leave the law out")
-
-
 def check_settings(case: Any) -> None:
     """Raises StudyError for the first invalid setting of a `studies.runs.case.Case`."""
     if isinstance(case.method, type) or not is_dataclass(case.method):

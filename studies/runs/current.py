@@ -5,7 +5,8 @@ from pathlib import Path
 
 from massspring.sources import source_fingerprint
 from studies.geometry.mesher.jobs import MAKERS
-from studies.runs.case import ADAPTER, ADAPTIVE, Case
+from studies.runs.case import Case
+from studies.runs.recipes import ADAPTER, ADAPTIVE
 from studies.runs.user_code import files_of
 from studies.store.paths import record_path
 
@@ -18,7 +19,7 @@ def run_fingerprint() -> str:
 def case_fingerprint(case: Case) -> str:
     """Hash of the code that makes the run of a case: `run_fingerprint`, the user's files with its method and law, and
     for an adaptive body the code that solves references."""
-    parts = [file.fingerprint for file in files_of(case.method, case.body.law)]
+    parts = [file.fingerprint for file in files_of(case)]
     if case.body.graded == ADAPTIVE:
         parts.append(source_fingerprint(ADAPTER))
     if not parts:

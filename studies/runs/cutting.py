@@ -16,7 +16,7 @@ from massspring.layout.face_pairs import faces_behind
 from studies.base.errors import DoesNotApply, StudyError
 from studies.geometry.mesh.organ_mesh import OrganMesh, boundary_triangles
 from studies.meshing.opened_mesh import Opened
-from studies.runs.case import BodyRecipe
+from studies.runs.recipes import BodyRecipe
 from studies.scene.cut import Cut
 from studies.scene.scene import Scene
 

@@ -6,8 +6,9 @@ import numpy as np
 
 from massspring import Free, History, ImplicitVolume, Method, Probe, simulate
 from studies.base.errors import StudyError
-from studies.runs.case import BodyRecipe, Case
+from studies.runs.case import Case
 from studies.runs.prepare import Prepared, prepare
+from studies.runs.recipes import SurfaceBody
 from studies.scene.library.ball_squeeze import BALL_SQUEEZE
 from studies.scene.library.stomach_slide import NODES, PRESS_END, SLIDE_END, STOMACH_SLIDE
 
@@ -39,12 +40,12 @@ def play(case: Case) -> Played:
 
 def ball_case(method: Method, nodes: int = BALL_NODES) -> Case:
     """The squeezed ball of Figures 2 and 3 on the paper's surface body; 800 frames, the iterations of the paper."""
-    return Case(BALL_SQUEEZE, BodyRecipe("surface", nodes), method)
+    return Case(BALL_SQUEEZE, SurfaceBody(nodes), method)
 
 
 def slide_case(nodes: int = NODES, method: Method | None = None) -> Case:
     """The refined stomach and the sliding probe of Figure 4; a few hundred nodes are enough for a test."""
-    return Case(STOMACH_SLIDE, BodyRecipe("surface", nodes, axis="centre_line"), method or ImplicitVolume())
+    return Case(STOMACH_SLIDE, SurfaceBody(nodes, axis="centre_line"), method or ImplicitVolume())
 
 
 def squeezed_balls(nodes: int = BALL_NODES) -> dict[str, Played]:

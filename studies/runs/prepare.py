@@ -20,7 +20,6 @@ from massspring import (
     surface_body,
     tetrahedral_body,
 )
-from massspring.body.membranes import MEMBRANE_LAWS
 from massspring.body.opening import parents
 from massspring.body.volumes import Volumes
 from massspring.methods.capabilities import No
@@ -32,7 +31,7 @@ from studies.meshing.opened_mesh import Opened, cells_of, opened_in_stages
 from studies.meshing.quadratic_mesh import QuadraticMesh
 from studies.meshing.scene_mesh import mesh_for, patch_nodes
 from studies.meshing.virtual_mesh import Tissue, VirtualMesh, virtual_mesh
-from studies.runs.case import ADAPTER, ADAPTIVE, VIRTUAL, BodyRecipe, Case
+from studies.runs.case import Case
 from studies.runs.cutting import (
     LUMEN,
     Opening,
@@ -47,6 +46,16 @@ from studies.runs.cutting import (
 )
 from studies.runs.limits import check_size
 from studies.runs.quadratic import check_masses, flat_mesh, quadratic_for
+from studies.runs.recipes import (
+    ADAPTER,
+    ADAPTIVE,
+    VIRTUAL,
+    BodyRecipe,
+    MembraneBody,
+    QuadraticBody,
+    SurfaceBody,
+    TetrahedralBody,
+)
 from studies.runs.user_code import own_laws, sprung_by
 from studies.scene.clock import event_frames
 from studies.scene.scene import Scene
@@ -77,7 +86,7 @@ class Prepared:
 
 def mesh_of(scene: Scene, recipe: BodyRecipe) -> OrganMesh | QuadraticMesh:
     """The mesh for a recipe. Raises StudyError."""
-    quadratic = recipe.kind == "quadratic"
+    quadratic = isinstance(recipe, QuadraticBody)
     if recipe.cut == VIRTUAL:
         scene = replace(scene, cuts=())  # the mesh is made without the cut
     if recipe.graded == ADAPTIVE:
@@ -92,7 +101,7 @@ def mesh_of(scene: Scene, recipe: BodyRecipe) -> OrganMesh | QuadraticMesh:
     # The paper's body of a hollow organ is only its outer surface; the density of the content needs the wall. A cut is
     # meshed with the tissue on both sides.
     inside = scene.lumen is not None or bool(scene.cuts)
-    return mesh_for(scene, recipe.nodes, filled=recipe.kind == "tetrahedral" or inside)
+    return mesh_for(scene, recipe.nodes, filled=isinstance(recipe, TetrahedralBody) or inside)
 
 
 def body_for(
@@ -103,13 +112,14 @@ def body_for(
     Raises StudyError or MassSpringError."""
     if not recipe.stiffness > 0:
         raise StudyError(f"the stiffness factor is {recipe.stiffness}; it must be positive")
-    if isinstance(mesh, QuadraticMesh):
+    if isinstance(recipe, QuadraticBody) and isinstance(mesh, QuadraticMesh):
         return quadratic_for(scene, recipe, mesh)
+    assert isinstance(mesh, OrganMesh)  # mesh_of makes a quadratic mesh for a quadratic body alone
     material = Material(scene.tissue.shear_modulus, scene.tissue.density)
     outside = mesh.outer() if mesh.hollow else mesh
-    if recipe.kind == "membrane":
+    if isinstance(recipe, MembraneBody):
         body = wall_for(scene, recipe, mesh, material)
-    elif recipe.kind == "surface":
+    elif isinstance(recipe, SurfaceBody):
         body = surface_body(
             outside.points[: outside.outer_count], outside.triangles, material, recipe.axis, recipe.weights
         )
@@ -126,12 +136,10 @@ def body_for(
     return body if volumes is None else body.keeping(volumes)
 
 
-def wall_for(scene: Scene, recipe: BodyRecipe, mesh: OrganMesh, material: Material) -> Body:
+def wall_for(scene: Scene, recipe: MembraneBody, mesh: OrganMesh, material: Material) -> Body:
     """A hollow organ as a membrane on its outer surface, with the mean thickness of its wall. Raises StudyError."""
     if not mesh.hollow:
         raise StudyError(f"scene '{scene.name}' has a solid organ; a membrane is for the wall of a hollow one")
-    if recipe.law not in MEMBRANE_LAWS:
-        raise StudyError(f"law '{recipe.law}' is not for membranes; choose {' or '.join(MEMBRANE_LAWS)}")
     outside = mesh.outer()
     thickness = mesh.volume / triangle_areas(outside.points, outside.triangles).sum()
     # The content has the density of the tissue, as in a surface body.
@@ -143,7 +151,7 @@ def volumes_for(scene: Scene, recipe: BodyRecipe, mesh: OrganMesh, body: Body) -
     """The kept volumes of a recipe; None for the tissue as a whole. Raises MassSpringError for volumes that the body
     does not have."""
     surfaces = {}
-    if recipe.kind == "tetrahedral" and mesh.hollow and scene.filled:
+    if isinstance(recipe, TetrahedralBody) and mesh.hollow and scene.filled:
         if recipe.volumes == "whole":
             return Volumes.closed_surfaces(body, {WHOLE: mesh.outer_triangles})
         if recipe.volumes == "scene":
@@ -206,7 +214,7 @@ def prepare(case: Case) -> Prepared:
     mesh = mesh_of(scene, case.body)
     from studies.meshing.kept_shape import tell_shape  # imports the finite elements
 
-    tell_shape(scene, mesh, filled=case.body.kind in ("tetrahedral", "quadratic"))
+    tell_shape(scene, mesh, filled=isinstance(case.body, TetrahedralBody | QuadraticBody))
     return prepared_on(case, mesh)
 
 
@@ -219,7 +227,7 @@ def prepared_on(case: Case, mesh: OrganMesh | QuadraticMesh) -> Prepared:
     mesh = flat_mesh(mesh, body)
     targets = targets_for(scene, mesh, body)
     check_applies(case, body, bool(targets))
-    if case.body.kind in ("surface", "membrane") and mesh.hollow:
+    if isinstance(case.body, SurfaceBody | MembraneBody) and mesh.hollow:
         mesh = mesh.outer()
     attachments, last, frames = attachments_for(scene, mesh), body, case.frames or scene.frames
     events, opening, limit_before, tissue = (), None, None, None
@@ -265,7 +273,7 @@ def cut_of(
         before, growth = last, None
         if isinstance(stage, VirtualMesh):
             last, parent, flat = body_for(scene, recipe, stage.mesh, stage.share), stage.parent, stage.mesh
-        elif recipe.kind == "surface":
+        elif isinstance(recipe, SurfaceBody):
             assert isinstance(stage.mesh, OrganMesh)  # that of a quadratic body has no surface body
             pieces = surface_pieces(before, stage, recipe.axis)
             last, parent, growth = pieces.body, pieces.parent, pieces.growth

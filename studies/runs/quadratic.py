@@ -4,7 +4,7 @@ from massspring import Body, Material, quadratic_body
 from studies.base.errors import DoesNotApply
 from studies.geometry import OrganMesh
 from studies.meshing.quadratic_mesh import QuadraticMesh
-from studies.runs.case import BodyRecipe
+from studies.runs.recipes import BodyRecipe, QuadraticBody
 from studies.scene.inertia import why_inertia_matters
 from studies.scene.scene import Scene
 
@@ -16,7 +16,7 @@ def check_masses(scene: Scene, recipe: BodyRecipe) -> None:
         raise DoesNotApply(f"masses by stiffness do not apply to scene '{scene.name}': {reason}")
 
 
-def quadratic_for(scene: Scene, recipe: BodyRecipe, mesh: QuadraticMesh) -> Body:
+def quadratic_for(scene: Scene, recipe: QuadraticBody, mesh: QuadraticMesh) -> Body:
     """The body of quadratic tetrahedra with one volume per vertex, and one for a lumen that is filled and closed.
 
     Raises MassSpringError for a mesh that gives no valid body.

@@ -2,20 +2,29 @@
 again."""
 
 import json
-from typing import Any
 
 from studies.base.errors import StudyError
-from studies.runs.case import BodyRecipe, Case, case_from_json, case_to_dict
+from studies.runs.case import Case, case_from_json, case_to_dict
+from studies.runs.recipes import BodyRecipe, TetrahedralBody
 from studies.scene.scene import Scene
+
+UNNAMED = {"recovers": False, "law": "neo_hookean"}
+"""Settings of methods that a recipe names only where they differ from this, so that published tables keep their
+texts."""
 
 
 def recipe_text(case: Case) -> str:
     """JSON of the settings that differ from those of `Case(scene)`: '{"body": {"kind": "quadratic", "nodes": 794}}'.
 
-    Additional recorded fields are left out, since they change no number of a table."""
-    usual, given = _parts(Case(case.scene)), _parts(case.replaced(recorded=()))
+    Of a method all settings. Additional recorded fields are left out, since they change no number of a table."""
+    usual, given = case_to_dict(Case(case.scene)), case_to_dict(case.replaced(recorded=()))
     differing = {name: value for name, value in given.items() if value != usual.get(name)}
-    return json.dumps({name: _chosen(value, usual.get(name)) for name, value in differing.items()})
+    if "body" in differing:
+        differing["body"] = case.body.chosen
+    if "method" in differing:
+        settings = differing["method"]["settings"].items()
+        differing["method"]["settings"] = {k: v for k, v in settings if k not in UNNAMED or v != UNNAMED[k]}
+    return json.dumps(differing)
 
 
 def case_of_recipe(scene: Scene, text: str) -> Case:
@@ -26,25 +35,13 @@ def case_of_recipe(scene: Scene, text: str) -> Case:
         raise StudyError(f"{str(text)[:60]!r} is not a recipe of a case ({error})") from error
     if not isinstance(chosen, dict):
         raise StudyError(f"{text[:60]!r} is not a recipe of a case; it must be a JSON object")
-    whole = case_to_dict(Case(scene))
-    for name, value in chosen.items():
-        mixes = name == "body" and isinstance(value, dict)
-        whole[name] = {**whole[name], **value} if mixes else value
+    whole = case_to_dict(Case(scene)) | chosen
+    if isinstance(whole["body"], dict):
+        whole["body"] = {"kind": TetrahedralBody.kind} | whole["body"]
     return case_from_json(json.dumps(whole))
 
 
 def body_words(body: BodyRecipe) -> str:
     """Name of a body in tables: "graded quadratic, masses by stiffness, 794"."""
-    law = "" if body.law in ("van_gelder", "cotangent") else f", {body.law}"
+    law = "" if body.law in ("", "van_gelder", "cotangent") else f", {body.law}"
     return f"{body.series}{law}, {body.nodes}"
-
-
-def _parts(case: Case) -> dict[str, Any]:
-    return {name: value for name, value in case_to_dict(case).items() if name != "scene"}
-
-
-def _chosen(value: Any, usual: Any) -> Any:
-    """Settings that differ from `usual`; of a body field by field, of a method all of them."""
-    if not isinstance(value, dict) or "name" in value:
-        return value
-    return {name: item for name, item in value.items() if item != usual.get(name)}

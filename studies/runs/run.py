@@ -108,7 +108,7 @@ def judge(case: Case, prepared: Prepared, history: History) -> tuple[Status, str
 
 
 def _record(case: Case, status: Status, message: str, attributes: dict, fields: dict[str, Field]) -> Record:
-    own = {str(file.path): file.sha256 for file in files_of(case.method, case.body.law)}
+    own = {str(file.path): file.sha256 for file in files_of(case)}
     return new_record(
         kind="run",
         key=case.key,

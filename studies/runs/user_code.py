@@ -107,7 +107,7 @@ def load_file(path: Path) -> ModuleType:
 
 def given_files(cases: Iterable[Any]) -> tuple[Given, ...]:
     """The user's files that cases (studies.runs.case) need, for workers."""
-    files = {file for case in cases for file in files_of(case.method, case.body.law)}
+    files = {file for case in cases for file in files_of(case)}
     return tuple(sorted((str(file.path), file.content) for file in files))
 
 
@@ -148,9 +148,9 @@ def _file_of_module(name: str) -> UserCode | None:
     return read_code(Path(file)) if file is not None and Path(file).is_file() else None
 
 
-def files_of(method: Method, law: str) -> tuple[UserCode, ...]:
-    """The user's files that define a method and the law of this name, each once."""
-    things = [type(method), *([_LAWS[law].stiffness] if law in _LAWS else [])]
+def files_of(case: Any) -> tuple[UserCode, ...]:
+    """The user's files that define the method and the law of a case (studies.runs.case), each once."""
+    things = [type(case.method), *([_LAWS[case.body.law].stiffness] if case.body.law in _LAWS else [])]
     return tuple({file.path: file for file in map(file_of, things) if file is not None}.values())
 
 
@@ -183,12 +183,12 @@ def own_laws() -> Mapping[str, StiffnessLaw]:
 
 
 def law_names() -> tuple[str, ...]:
-    """Names of all laws for recipes: those of the project and of the user's files."""
-    return (*laws_by_name(), *SMOOTHED, *MEMBRANE_LAWS, *_LAWS)
+    """Names of all laws of tetrahedral bodies: those of the project and of the user's files."""
+    return (*laws_by_name(), *SMOOTHED, *_LAWS)
 
 
 def own_law(law: StiffnessLaw) -> str:
-    """Registers a law for recipes and returns its name: `BodyRecipe(law=own_law(StiffnessLaw(bars)))`.
+    """Registers a law for recipes and returns its name: `TetrahedralBody(law=own_law(StiffnessLaw(bars)))`.
 
     Raises StudyError for an object that is no law, for a name that another law has, and for a law that is not defined
     in a file.

@@ -14,7 +14,7 @@ TEXT = '''"""{name}: held at {where}, palpated on a patch. Written by `organbenc
 from pathlib import Path
 
 from massspring import Sphere, Trajectory
-from studies import BodyRecipe, Case, Chart, ForceOutput, Held, ImplicitVolume, Organ, ReferencePlan, Scene, Study
+from studies import Case, Chart, ForceOutput, Held, ImplicitVolume, Organ, ReferencePlan, Scene, Study, {bodies}
 from studies.geometry import {region}
 from studies.scene.placing import along, press_times, scaled
 from studies.scene.tissues import {tissue}
@@ -48,7 +48,7 @@ SCENE = Scene(
 )
 CASES = (
     # One volume, which the paper keeps: quick, but inaccurate (docs/findings.md, the paper's body).
-    Case(SCENE, BodyRecipe("tetrahedral", {nodes}), ImplicitVolume(), recorded=("surface",)),
+    Case(SCENE, TetrahedralBody({nodes}), ImplicitVolume(), recorded=("surface",)),
 {recommended})
 CHARTS = (
     Chart("volume.png", "studies.plots.volume_history:draw"),
@@ -75,7 +75,7 @@ class Recommended:
     """The second body of a scene file."""
 
     body: str
-    """As Python: "BodyRecipe(kind='quadratic')"."""
+    """As Python: "QuadraticBody(nodes=794)"."""
     dt_fraction: float
     """Time step over the stability limit."""
     alike: tuple[str, ...]
@@ -100,9 +100,10 @@ def scene_text(
     given = {key: json.dumps(value) if isinstance(value, str) else repr(value) for key, value in organ.items()}
     entries = ", ".join(f'"{key}": {text}' for key, text in (given | {"path": "str(FILE)"}).items())
     radius, depth = (round(share * proposal.sides[0], 4) for share in (RADIUS, DEPTH))
-    second = ""
+    second, bodies = "", {"TetrahedralBody"}
     if recommended is not None:
         names = " and ".join(recommended.alike)
+        bodies.add(recommended.body.split("(")[0])
         second = RECOMMENDED.format(**vars(recommended) | {"alike": names})
     return TEXT.format(
         name=python_name(stem_of(path)),
@@ -122,6 +123,7 @@ def scene_text(
             (f"{type(proposal.hold).__name__}(", ")")
         ),
         nodes=nodes,
+        bodies=", ".join(sorted(bodies)),
         recommended=second,
     )
 

@@ -135,7 +135,7 @@ class CaseJob(Job):
     def failure(self) -> tuple[str, dict[str, Any]]:
         from studies.runs.run import OWN_FILES
 
-        own = {str(file.path): file.sha256 for file in files_of(self.work.method, self.work.body.law)}
+        own = {str(file.path): file.sha256 for file in files_of(self.work)}
         return "run", {"warnings": ""} | ({OWN_FILES: json.dumps(own)} if own else {})
 
 

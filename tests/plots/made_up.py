@@ -10,7 +10,8 @@ from massspring.body.quadratic import boundary_facets, parts_of_facets
 from studies.metrics.run import Run
 from studies.metrics.timing.protocol import FrameTiming
 from studies.reference.solution import Boundary
-from studies.runs.case import BodyRecipe, Case
+from studies.runs.case import Case
+from studies.runs.recipes import BODIES
 from studies.scene.library.ball_clamped import BALL_CLAMPED
 from studies.scene.library.ball_squeeze import BALL_SQUEEZE
 from studies.scene.library.liver_press import LIVER_PRESS
@@ -105,9 +106,7 @@ def run(scene=BALL_SQUEEZE, kind="tetrahedral", method=None, status=Status.OK, e
     dt, fixed_step = options.get("dt", 1e-3), "dt" in options
     case = Case(
         scene,
-        BodyRecipe(
-            kind, options.get("nodes", 550), stiffness=options.get("stiffness", 1.0), **options.get("recipe", {})
-        ),
+        BODIES[kind](options.get("nodes", 550), stiffness=options.get("stiffness", 1.0), **options.get("recipe", {})),
         method or ImplicitVolume(),
         dt=dt if fixed_step else "auto",
         dt_fraction=options.get("fraction", 0.5),

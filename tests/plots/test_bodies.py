@@ -12,15 +12,20 @@ from studies.plots import force_path, laws, methods, volume_history
 from studies.plots.campaigns import recovery, stability
 from studies.plots.style.bodies import body_looks
 from studies.plots.style.style import BLACK, BODY_LOOKS, SPARE_LOOKS, VERMILLION, method_colour, styled
-from studies.runs.case import VIRTUAL
+from studies.runs.recipes import VIRTUAL
 from studies.scene.library.stomach_press import STOMACH_PRESS
 from tests.plots.made_up import run
 from tests.plots.reading import words
 
 RECIPES = [
-    {"kind": kind, "recipe": {"volumes": volumes, "regions": regions}}
-    for kind in ("tetrahedral", "surface", "membrane")
-    for volumes, regions in (("scene", 32), ("whole", 32), ("nodal", 32), ("regions", 32), ("regions", 8))
+    *(
+        {"kind": "tetrahedral", "recipe": {"volumes": volumes, "regions": regions, "graded": graded}}
+        for graded in (False, True)
+        for volumes, regions in (("scene", 32), ("whole", 32), ("nodal", 32), ("regions", 32), ("regions", 8))
+    ),
+    {"kind": "surface"},
+    {"kind": "membrane"},
+    *({"kind": "quadratic", "recipe": {"graded": graded}} for graded in (False, True, "adaptive")),
 ]
 
 
@@ -125,14 +130,14 @@ def test_regions_of_different_number_have_lines_of_their_own_among_the_laws():
 
 
 def test_rows_and_panels_carry_the_body():
-    runs = [run(recipe={"volumes": "regions"}), run(kind="surface", recipe={"volumes": "whole"})]
+    runs = [run(recipe={"volumes": "regions"}), run(kind="surface")]
     assert list(methods.row_names(runs).values()) == [
         "implicit volume, tetrahedral, 32 volumes",
-        "implicit volume, surface, one volume",
+        "implicit volume, surface",
     ]
     assert list(methods.row_names(runs[:1]).values()) == ["implicit volume, 32 volumes"]
     titles = [axes.get_title().replace("\n", " ") for axes in stability.figure(runs).axes]
-    assert "Ball squeeze, surface, one volume, implicit volume" in titles
+    assert "Ball squeeze, surface, implicit volume" in titles
 
 
 def test_a_method_of_the_user_has_a_colour_that_no_other_method_has():

@@ -9,7 +9,8 @@ from studies.metrics.metrics import METRICS
 from studies.metrics.run import Run
 from studies.metrics.table import metric
 from studies.reference.solution import Boundary
-from studies.runs.case import BodyRecipe, Case
+from studies.runs.case import Case
+from studies.runs.recipes import TetrahedralBody
 from studies.scene.library.ball_clamped import BALL_CLAMPED
 from studies.store.new_record import new_fields, new_record
 from studies.store.record import Status
@@ -115,7 +116,7 @@ def run(final=None, volume=(1.0, 1.0, 1.0, 1.0), force=(0.5, 1.0, 1.5, 2.0), **c
         attributes=ATTRIBUTES | changes.pop("attributes", {}),
         fields=new_fields(RUN_FIELDS, values),
     )
-    case = Case(changes.pop("scene", SCENE), BodyRecipe())
+    case = Case(changes.pop("scene", SCENE), TetrahedralBody())
     return Run(case, record, changes.pop("reference", reference()), changes.pop("timing", None))
 
 

@@ -9,7 +9,8 @@ import pytest
 from massspring import Free, ImplicitVolume
 from studies.catalog import Study
 from studies.geometry.mesh.organ_mesh import boundary_triangles
-from studies.runs.case import BodyRecipe, Case
+from studies.runs.case import Case
+from studies.runs.recipes import TetrahedralBody
 from studies.scene.library import Organ, Scene
 from studies.scene.library.ball_squeeze import BALL_SQUEEZE
 from studies.store.ledger import Ledger
@@ -49,7 +50,7 @@ class Silent:
 
 def tiny_case(**changes) -> Case:
     """60 surface nodes, 5 frames, no reference."""
-    return Case(SQUEEZE, BodyRecipe("tetrahedral", NODES), ImplicitVolume(), frames=FRAMES).replaced(**changes)
+    return Case(SQUEEZE, TetrahedralBody(NODES), ImplicitVolume(), frames=FRAMES).replaced(**changes)
 
 
 def tiny_study(**changes) -> Study:

@@ -7,7 +7,8 @@ from massspring import ImplicitVolume
 from studies.catalog.accuracy import FINEST, LONG, SHORT, even, graded
 from studies.catalog.population.draw import Population
 from studies.catalog.study import Chart, Study
-from studies.runs.case import BodyRecipe, Case
+from studies.runs.case import Case
+from studies.runs.recipes import BodyRecipe, SurfaceBody, TetrahedralBody
 from studies.scene.kind import has_wall
 from studies.scene.scene import Scene
 
@@ -31,9 +32,9 @@ def recipes_for(scene: Scene) -> tuple[tuple[BodyRecipe, float], ...]:
     axis = "centre_line" if has_wall(scene) else "straight"
     budgets = (*graded(scene), *(replace(body, nodes=FINEST) for body in graded(scene)[-1:]))
     return (
-        (BodyRecipe("surface", NODES, axis=axis), SHORT),
-        (BodyRecipe(nodes=NODES), SHORT),
-        (BodyRecipe(nodes=NODES, law="cotangent", volumes="nodal"), SHORT),
+        (SurfaceBody(NODES, axis=axis), SHORT),
+        (TetrahedralBody(nodes=NODES), SHORT),
+        (TetrahedralBody(nodes=NODES, law="cotangent", volumes="nodal"), SHORT),
         *((body, LONG) for body in (even(scene)[0], *budgets)),
     )
 

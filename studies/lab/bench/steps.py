@@ -62,7 +62,7 @@ def volumes(count: int | None) -> ms.Setup:
 
 def slide() -> ms.Setup:
     """The thin probe on the refined stomach, at its own time step."""
-    return studies.prepare(studies.Case(studies.STOMACH_SLIDE, studies.BodyRecipe("surface", nodes=LARGE))).setup
+    return studies.prepare(studies.Case(studies.STOMACH_SLIDE, studies.SurfaceBody(LARGE))).setup
 
 
 SETUPS = {

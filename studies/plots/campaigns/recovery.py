@@ -13,7 +13,8 @@ from studies.metrics.table import metric
 from studies.plots.style.bodies import BodyLook, body_handle, body_looks
 from studies.plots.style.page import blank, finish, good_frames, grouped, has_frames, log_axis, panel_grid
 from studies.plots.style.style import BLACK, GREY, PURPLE, SMALL, drawing, method_colour, styled
-from studies.runs.case import BodyRecipe, Case, chosen_settings
+from studies.runs.case import Case, chosen_settings
+from studies.runs.recipes import BodyRecipe
 
 TITLE = "From which starts a body finds its rest shape again"
 LOWEST, HIGHEST = -1.6, 1.15

@@ -12,7 +12,7 @@ from studies.base.counting import readable
 from studies.metrics.run import Run, by_scene
 from studies.plots.style.families import family_of
 from studies.plots.style.style import BODY_LOOKS, SPARE_LOOKS, method_colour, method_label
-from studies.runs.case import BodyRecipe
+from studies.runs.recipes import BodyRecipe
 
 OPTIONS = ("law", "axis", "weights", "stiffness", "nodes")
 """Fields of a BodyRecipe that its `series` does not name, and that a chart may have to."""
@@ -54,7 +54,7 @@ def body_looks(runs: Sequence[Run], ignored: Sequence[str] = ()) -> dict[BodyRec
 
 def _name(body: BodyRecipe, groups: Sequence[Sequence[BodyRecipe]], ignored: Sequence[str]) -> str:
     same = [[other for other in group if other.series == body.series] for group in groups]
-    differing = [o for o in OPTIONS if any(len({getattr(other, o) for other in group}) > 1 for group in same)]
+    differing = [o for o in OPTIONS if any(len({getattr(other, o, None) for other in group}) > 1 for group in same)]
     return ", ".join([body.series, *(_words(body, option) for option in differing if option not in ignored)])
 
 

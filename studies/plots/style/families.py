@@ -18,7 +18,8 @@ from studies.plots.style.style import (
     YELLOW,
     method_colour,
 )
-from studies.runs.case import ADAPTIVE, VIRTUAL, Case
+from studies.runs.case import Case
+from studies.runs.recipes import ADAPTIVE, VIRTUAL
 
 PAPER = "the paper's body"
 

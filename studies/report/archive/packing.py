@@ -103,7 +103,7 @@ def pack(root: Path, studies: Sequence[Study], target: Path, day: str, extra: It
 
 def own_files(studies: Sequence[Study]) -> list[Path]:
     """The user's files in which methods and laws of the cases are."""
-    return [file.path for s in studies for case in s.cases for file in files_of(case.method, case.body.law)]
+    return [file.path for s in studies for case in s.cases for file in files_of(case)]
 
 
 def check_current(ledger: Ledger, studies: Sequence[Study]) -> None:

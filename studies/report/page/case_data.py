@@ -38,7 +38,7 @@ class Surface:
 def case_data(run: Run, again: str) -> dict[str, Any]:
     """JSON-able; `again`: the command that repeats the run."""
     case, record = run.case, run.record
-    law = f", law {readable(case.body.law)}" if case.body.law != "van_gelder" else ""
+    law = f", law {readable(case.body.law)}" if case.body.law not in ("", "van_gelder") else ""
     title = f"{readable(case.scene.name)} · {case.body.series}{law}, {case.body.nodes} nodes · {case.method_words}"
     step = f"{1e3 * float(record.attributes['dt']):.3g} ms" if "dt" in record.attributes else "unknown"
     outcome = record.status if record.status == Status.OK else f"{record.status} ({record.message})"

@@ -112,7 +112,7 @@ def _data(root: Path, study: Study, run: Run) -> dict[str, Any]:
     if is_entry(run.case):
         return entry_data(run, _scene_word(study, run.case.scene.name))
     path = _named(root, case_path(root, study.name, run.case))
-    own = files_of(run.case.method, run.case.body.law)
+    own = files_of(run.case)
     files = [word for file in own for word in ("--file", file.path.name)]
     again = shlex.join(["organbench", "replay", str(path), *files])
     line = command_line("run", [study], "--case", run.case.name, *results_option(root), elsewhere=True)

@@ -10,7 +10,7 @@ from studies.catalog.accuracy import ACCURACY
 from studies.metrics.judged import UNKNOWN, Judged, cheapest, cost_of_frames, nearest
 from studies.metrics.timing.short import ShortTiming, short_timing
 from studies.metrics.wish import Wish
-from studies.runs.case import BodyRecipe
+from studies.runs.recipes import BodyRecipe
 from studies.scene.kind import kind_of
 from studies.scene.library import SCENES
 from studies.scene.scene import Scene

@@ -1,13 +1,12 @@
 """An answer as lines for people: the recipe, its errors with their uncertainty, its cost, how to run it again."""
 
-from dataclasses import fields
-
 from studies.catalog.accuracy import ACCURACY
 from studies.meshing.bounds import SHAPE, SHAPE_VOLUME
 from studies.metrics.cells import MISSING, value_cell
 from studies.metrics.judged import Judged, Measured
 from studies.metrics.wish import Wish
-from studies.runs.case import BodyRecipe, Case
+from studies.runs.case import Case
+from studies.runs.recipes import BodyRecipe
 from studies.scene.library import SCENES
 from studies.tools.advise.answer import Advice
 from studies.tools.advise.population import words as others
@@ -166,13 +165,13 @@ def _command(answer: Advice, case: Case) -> str:
 
 
 def in_python(case: Case) -> str:
-    """The case as it is written down: "Case(LIVER_PRESS, BodyRecipe(kind='quadratic', nodes=794), dt_fraction=0.8)"."""
+    """The case as it is written down: "Case(LIVER_PRESS, QuadraticBody(nodes=794), dt_fraction=0.8)"."""
     scene = case.scene.name.upper() if case.scene in SCENES else "scene"
     return f"Case({scene}, {body_in_python(case.body)}, dt_fraction={case.dt_fraction:g})"
 
 
 def body_in_python(body: BodyRecipe) -> str:
-    """ "BodyRecipe(kind='quadratic', nodes=794)"."""
-    usual = BodyRecipe()
-    names = [field.name for field in fields(BodyRecipe) if getattr(body, field.name) != getattr(usual, field.name)]
-    return f"BodyRecipe({', '.join(f'{name}={getattr(body, name)!r}' for name in names)})"
+    """ "QuadraticBody(nodes=794)"."""
+    usual = vars(type(body)())
+    chosen = [f"{name}={value!r}" for name, value in vars(body).items() if value != usual[name]]
+    return f"{type(body).__name__}({', '.join(chosen)})"

@@ -18,9 +18,10 @@ from studies.meshing.graded_mesh import MIDDLE, halved
 from studies.meshing.quadratic_mesh import QuadraticMesh
 from studies.meshing.scene_mesh import mesh_for
 from studies.meshing.shaping import quadratic_mesh
-from studies.runs.case import VIRTUAL, BodyRecipe, Case
+from studies.runs.case import Case
 from studies.runs.cutting import LUMEN, check_blades, check_opens, check_virtual
 from studies.runs.prepare import Prepared, prepared_on
+from studies.runs.recipes import VIRTUAL, QuadraticBody, SurfaceBody, TetrahedralBody
 from studies.scene.checks import check_scene, surface_of
 from studies.scene.cut import Cut
 from studies.scene.scene import ForceOutput, Held, Lumen, Organ, Scene
@@ -270,13 +271,14 @@ def case_of(trial: CutTrial, scene: Scene) -> Case:
     """The body and its method. Raises StudyError."""
     law, _, nodal = trial.body.partition(" ")
     method: Method = {method.name: method for method in METHODS}[trial.method]()
+    way: dict[str, Any] = {} if trial.way == "conforming" else {"cut": trial.way}
     if law == "quadratic":
-        recipe = BodyRecipe("quadratic", 4 * trial.nodes - 6, cut=trial.way)
+        recipe = QuadraticBody(4 * trial.nodes - 6, **way)
         return Case(scene, recipe, method, dt_fraction=0.8)
     if law == SURFACE:
-        return Case(scene, BodyRecipe(SURFACE, trial.nodes, cut=trial.way), method, dt_fraction=0.8)
+        return Case(scene, SurfaceBody(trial.nodes, **way), method, dt_fraction=0.8)
     volumes = "nodal" if nodal or law == "cotangent" else "scene"
-    recipe = BodyRecipe(nodes=trial.nodes, law=law, volumes=volumes, cut=trial.way)
+    recipe = TetrahedralBody(nodes=trial.nodes, law=law, volumes=volumes, **way)
     return Case(scene, recipe, method, dt_fraction=0.8)
 
 

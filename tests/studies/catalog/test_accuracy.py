@@ -19,8 +19,8 @@ from studies.catalog.work_precision import WORK_PRECISION
 from studies.meshing.graded_mesh import usual_grading
 from studies.metrics.metrics import METRICS
 from studies.reference.adaptive_mesh import why_not
-from studies.runs.case import ADAPTIVE, neighbours
 from studies.runs.quadratic import check_masses
+from studies.runs.recipes import ADAPTIVE, neighbours
 from studies.scene.inertia import why_inertia_matters
 from studies.scene.library import JUDGED
 from studies.scene.quantities import allowed

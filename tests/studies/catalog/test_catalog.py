@@ -1,7 +1,5 @@
 """Every study has a question, cases that can be prepared, names that exist, and a smoke version."""
 
-from dataclasses import replace
-
 import pytest
 
 from massspring import LITERATURE
@@ -9,8 +7,8 @@ from studies.base.errors import DoesNotApply, StudyError
 from studies.catalog import STUDIES
 from studies.catalog.study import SMOKE_FRAMES, SMOKE_NODES, SMOKE_NODES_CUT, SMOKE_NODES_HOLLOW, SMOKE_QUADRATIC
 from studies.metrics.table import metric
-from studies.runs.case import BodyRecipe
 from studies.runs.prepare import prepare
+from studies.runs.recipes import SurfaceBody
 from studies.store.paths import readable
 from studies.sweep.find_study import MAIN, find_studies, find_study
 from tests.campaigns import campaigns_but
@@ -87,7 +85,8 @@ def test_smoke_is_small_and_still_the_same_question(study):
 def kind(case):
     """What decides how a case is prepared, but for its scene: the recipe without its numbers of nodes and regions, and
     the method."""
-    return replace(case.body, nodes=0, regions=BodyRecipe().regions), case.method
+    chosen = {name: value for name, value in case.body.chosen.items() if name not in ("nodes", "regions")}
+    return str(chosen), case.method
 
 
 def representatives(cases):
@@ -130,5 +129,5 @@ def test_every_kind_of_case_can_be_prepared_in_every_scene(study):
 
 def test_smoke_drops_what_becomes_the_same():
     """Two mesh sizes above the smoke size are one smoke case, or the same file would be written twice."""
-    fine, finer = (tiny_case(body=tiny_case().body.__class__("surface", nodes)) for nodes in (550, 1100))
+    fine, finer = (tiny_case(body=SurfaceBody(nodes)) for nodes in (550, 1100))
     assert len(tiny_study(cases=(fine, finer)).smoke().cases) == 1

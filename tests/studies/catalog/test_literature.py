@@ -13,13 +13,14 @@ from studies.catalog.study import smoke_case
 from studies.exchange.entry import outside
 from studies.metrics.metrics import METRICS
 from studies.metrics.run import Run
-from studies.runs.case import BodyRecipe, Case, case_from_json
+from studies.runs.case import Case, case_from_json
+from studies.runs.recipes import TetrahedralBody
 from studies.runs.run import measure, replay, run_case
 from studies.scene.library import BALL_CLAMPED, BALL_SQUEEZE, SPLEEN_SAG
 from studies.store.record import Status, read_record
 from tests.campaigns import campaign
 
-NODAL = BodyRecipe(nodes=150, law="cotangent", volumes="nodal")
+NODAL = TetrahedralBody(nodes=150, law="cotangent", volumes="nodal")
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -64,8 +65,8 @@ def test_metrics_without_a_reference_are_numbers(ran):
     [
         (BALL_SQUEEZE, LinearModes(), NODAL, "no nodes are clamped"),
         (BALL_SQUEEZE, ElasticResponse(), NODAL, "no nodes are clamped"),
-        (BALL_CLAMPED, ElasticResponse(), BodyRecipe(nodes=150), "its springs must have no length"),
-        campaign(SPLEEN_SAG, ChainMail(), BodyRecipe(nodes=150), "gravity has no effect"),
+        (BALL_CLAMPED, ElasticResponse(), TetrahedralBody(nodes=150), "its springs must have no length"),
+        campaign(SPLEEN_SAG, ChainMail(), TetrahedralBody(nodes=150), "gravity has no effect"),
     ],
     ids=lambda value: getattr(value, "name", ""),
 )

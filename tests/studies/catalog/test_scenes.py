@@ -9,7 +9,7 @@ import pytest
 
 from massspring import METHODS, simulate
 from studies.base.errors import StudyError
-from studies.runs.case import BodyRecipe, Case
+from studies.runs.case import Case
 from studies.runs.prepare import prepare
 from studies.runs.run import checkpoint_frames
 from studies.scene.as_json import scene_from_dict, scene_to_json
@@ -35,7 +35,7 @@ def judged(request):
 
 
 def small(scene, kind="tetrahedral", **changes) -> Case:
-    return Case(scene, BodyRecipe(kind, THIN if has_wall(scene) else SMALL), frames=20).replaced(**changes)
+    return Case(scene, BODIES[kind](THIN if has_wall(scene) else SMALL), frames=20).replaced(**changes)
 
 
 @cache

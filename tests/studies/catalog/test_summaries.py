@@ -9,16 +9,16 @@ import pytest
 from massspring.body.quadratic import boundary_facets, parts_of_facets
 from studies.meshing.true_surface import ShapeErrors
 from studies.report.summary import ladder_of, recommended_of
-from studies.runs.case import BodyRecipe
+from studies.runs.recipes import QuadraticBody, SurfaceBody
 from studies.scene.library.spleen_sag import SPLEEN_SAG
 from studies.store.record import Status
 from tests.massspring.quadratic import second_order
 from tests.studies import made_up_run
 from tests.studies.tiny import cube
 
-PAPER = BodyRecipe("surface", 550)
-EVEN = BodyRecipe("quadratic", 594, mass="stiffness")
-GRADED = BodyRecipe("quadratic", 794, graded=True, mass="stiffness")
+PAPER = SurfaceBody(550)
+EVEN = QuadraticBody(594, mass="stiffness")
+GRADED = QuadraticBody(794, graded=True, mass="stiffness")
 DEVIATION = {PAPER: -0.7, EVEN: -0.02, GRADED: 0.01}
 FRAME_NS = {PAPER: 1e7, EVEN: 1e8, GRADED: 5e8}
 FLOORS = 0.001

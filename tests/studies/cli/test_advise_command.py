@@ -6,7 +6,8 @@ from pathlib import Path
 import pytest
 
 from studies.catalog.accuracy import ACCURACY
-from studies.runs.case import BodyRecipe, Case
+from studies.runs.case import Case
+from studies.runs.recipes import QuadraticBody
 from studies.scene.library import KIDNEY_PROBE, LIVER_PRESS, LIVER_PROBE
 from studies.tools.advise import campaign
 from tests.studies.tools.advise.made_up_campaign import GRADED, LADDER, publish, row, rows_of
@@ -14,10 +15,10 @@ from tests.studies.tools.advise.made_up_campaign import GRADED, LADDER, publish,
 STUDY = """
 from dataclasses import replace
 from massspring import ImplicitVolume
-from studies import LIVER_PROBE, BALL_CLAMPED, BodyRecipe, Case, Study
+from studies import BALL_CLAMPED, LIVER_PROBE, Case, Study, TetrahedralBody
 
 MINE = replace(LIVER_PROBE, name="mine", duration=9.0, reference=None)
-STUDY = Study("mine", "Does it run?", tuple(Case(s, BodyRecipe(), ImplicitVolume()) for s in {scenes}), (), ())
+STUDY = Study("mine", "Does it run?", tuple(Case(s, TetrahedralBody(), ImplicitVolume()) for s in {scenes}), (), ())
 """
 
 
@@ -45,7 +46,7 @@ def test_an_answer_holds_recipe_errors_cost_source_and_commands(advise, tmp_path
     timed = Case(LIVER_PRESS, GRADED, dt_fraction=0.8, timed=True)
     assert timed in [case.replaced(recorded=()) for case in ACCURACY.cases if case.name == name]
     (python,) = (line.split("in Python")[1] for line in out.splitlines() if "in Python" in line)
-    made = eval(python, {"Case": Case, "BodyRecipe": BodyRecipe, "LIVER_PRESS": LIVER_PRESS})
+    made = eval(python, {"Case": Case, "QuadraticBody": QuadraticBody, "LIVER_PRESS": LIVER_PRESS})
     assert made == Case(LIVER_PRESS, GRADED, dt_fraction=0.8)
 
 
@@ -69,7 +70,7 @@ def test_a_scene_of_the_user_gets_the_worst_of_its_kind(advise, tmp_path):
     file.write_text(STUDY.format(scenes="[MINE]"))
     out = advise(file, "--no-timing")
     assert "no run of this scene is stored: errors, shape and step are the worst of liver_probe, kidney_probe" in out
-    assert "on another machine" in out and "in Python     Case(scene, BodyRecipe(kind='quadratic'" in out
+    assert "on another machine" in out and "in Python     Case(scene, QuadraticBody(nodes" in out
 
 
 def test_times_of_another_machine_are_called_so(organbench, tmp_path):

@@ -175,10 +175,10 @@ def test_bad_meshes_fail_and_the_study_goes_on(organbench, tmp_path):
     file = tmp_path / "meshes.py"
     names = [str(tmp_path / f"{name}.obj") for name in ("good", "open", "large", "missing")]
     file.write_text(
-        "from dataclasses import replace\nfrom studies.runs.case import BodyRecipe\nfrom tests.studies.tiny import *\n"
+        "from dataclasses import replace\nfrom studies import SurfaceBody\nfrom tests.studies.tiny import *\n"
         f"NAMES = {names!r}\n"
         "SCENES = [replace(file_scene(name), name=f'file_{k}') for k, name in enumerate(NAMES)]\n"
-        "STUDY = tiny_study(cases=tuple(tiny_case(scene=s, body=BodyRecipe('surface')) for s in SCENES))\n"
+        "STUDY = tiny_study(cases=tuple(tiny_case(scene=s, body=SurfaceBody()) for s in SCENES))\n"
     )
     results = tmp_path / "results"
     code, out, err = organbench("run", file, "--results", results, "--jobs", 1)

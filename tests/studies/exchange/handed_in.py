@@ -3,11 +3,12 @@
 import numpy as np
 
 from massspring import ImplicitVolume
-from studies.runs.case import BodyRecipe, Case
+from studies.runs.case import Case
+from studies.runs.recipes import TetrahedralBody
 from tests.studies.octant import SCENE
 
 NODES, FRAMES = 150, 40
-CASE = Case(SCENE, BodyRecipe(nodes=NODES), ImplicitVolume(), frames=FRAMES)
+CASE = Case(SCENE, TetrahedralBody(nodes=NODES), ImplicitVolume(), frames=FRAMES)
 
 
 class HandedIn:

@@ -20,7 +20,8 @@ from studies.geometry.mesh.organ_mesh import boundary_triangles, tetrahedron_vol
 from studies.metrics.metrics import force_end, mean_error, opening_error
 from studies.metrics.run import Run
 from studies.reference.load import reference_for
-from studies.runs.case import BodyRecipe, Case
+from studies.runs.case import Case
+from studies.runs.recipes import TetrahedralBody
 from studies.runs.run import measure
 from studies.scene.library import BALL_BISECTED, BALL_INCISED, BALL_SQUEEZE
 from studies.scene.library.ball_incised import RADIUS
@@ -43,7 +44,7 @@ def folder(tmp_path_factory, mesh_cache):
 @pytest.fixture(scope="module")
 def cut_body(mesh_cache) -> Run:
     """Our own body, cut on the way and left to rest."""
-    case = Case(BALL_INCISED, BodyRecipe(nodes=NODES), ImplicitVolume())
+    case = Case(BALL_INCISED, TetrahedralBody(nodes=NODES), ImplicitVolume())
     run = Run(case, measure(case), reference_for(Path(), BALL_INCISED))
     assert run.record.status == "ok", run.record.message
     return run

@@ -19,8 +19,8 @@ from studies.meshing.kept_shape import (
     touched_facets,
 )
 from studies.meshing.scene_mesh import mesh_for
-from studies.runs.case import BodyRecipe
 from studies.runs.prepare import mesh_of, prepare
+from studies.runs.recipes import BODIES, QuadraticBody, TetrahedralBody
 from studies.scene.library import JUDGED, SCENES
 from studies.scene.library.ball_clamped import BALL_CLAMPED
 from studies.scene.library.liver_probe import LIVER_PROBE
@@ -46,11 +46,11 @@ def test_a_warning_names_both_errors_of_flat_sides():
 
 
 def test_curved_sides_keep_it():
-    assert warnings_of(SQUEEZE, mesh_of(SQUEEZE, BodyRecipe("quadratic", 234))) == []
+    assert warnings_of(SQUEEZE, mesh_of(SQUEEZE, QuadraticBody(234))) == []
 
 
 def test_a_warning_names_a_volume_that_is_too_large():
-    mesh = mesh_of(SQUEEZE, BodyRecipe("quadratic", 234))
+    mesh = mesh_of(SQUEEZE, QuadraticBody(234))
     (sentence,) = warnings_of(SQUEEZE, replace(mesh, points=1.003 * mesh.points))
     assert "volume +0.77 %" in sentence and "or quadratic" not in sentence
 
@@ -58,7 +58,7 @@ def test_a_warning_names_a_volume_that_is_too_large():
 @pytest.mark.parametrize("kind", ["tetrahedral", "quadratic"])
 def test_an_error_names_a_held_region_that_lost_a_facet(kind):
     scene = BALL_CLAMPED
-    mesh = mesh_of(scene, BodyRecipe(kind, 294))
+    mesh = mesh_of(scene, BODIES[kind](294))
     held = scene.held[0]
     facets, off = held_facets(mesh, held), held_area_error(scene, mesh, held)
     assert abs(off) < 0.03 and not any("held region" in line for line in warnings_of(scene, mesh))
@@ -71,7 +71,7 @@ def test_an_error_names_a_held_region_that_lost_a_facet(kind):
 @pytest.mark.parametrize(("off", "severity"), [(0.02, 0), (0.05, 1), (-0.05, 1), (-0.11, 2), (0.11, 2)])
 def test_the_held_area_is_warned_of_and_then_refused(monkeypatch, off, severity):
     monkeypatch.setattr(kept_shape, "held_area_error", lambda *_: off)
-    scene, mesh = BALL_CLAMPED, mesh_of(BALL_CLAMPED, BodyRecipe("quadratic", 294))
+    scene, mesh = BALL_CLAMPED, mesh_of(BALL_CLAMPED, QuadraticBody(294))
     if severity == 2:
         with pytest.raises(StudyError, match=r"held region 'bottom' is [-+]11 % off"):
             tell_shape(scene, mesh, filled=True)
@@ -86,7 +86,7 @@ def probed(radius: float):
 
 
 def test_a_warning_names_few_facets_before_the_run(monkeypatch):
-    mesh = mesh_of(BALL_CLAMPED, BodyRecipe(nodes=294))
+    mesh = mesh_of(BALL_CLAMPED, TetrahedralBody(nodes=294))
     thin, thick = (touched_facets(probed(radius), mesh) for radius in (0.01, 0.04))
     assert 0 < thin < FACETS < thick
     (sentence,) = [line for line in warnings_of(probed(0.01), mesh) if "touch" in line]
@@ -99,8 +99,8 @@ def test_a_warning_names_few_facets_before_the_run(monkeypatch):
 
 @pytest.mark.campaign
 def test_the_graded_liver_has_more_facets_under_its_probe():
-    few = mesh_of(LIVER_PROBE, BodyRecipe("quadratic", 394))
-    many = mesh_of(LIVER_PROBE, BodyRecipe("quadratic", 594, graded=True))
+    few = mesh_of(LIVER_PROBE, QuadraticBody(394))
+    many = mesh_of(LIVER_PROBE, QuadraticBody(594, graded=True))
     (sentence,) = [line for line in warnings_of(LIVER_PROBE, few) if "touch" in line]
     assert "below 20" in sentence and "graded='adaptive'" in sentence
     assert touched_facets(LIVER_PROBE, many) > touched_facets(LIVER_PROBE, few) > 0
@@ -124,14 +124,14 @@ def test_a_file_that_comes_as_it_is_has_its_own_shape(tmp_path):
 @pytest.mark.campaign
 def test_the_flat_stomach_of_400_nodes_holds_too_little():
     scene = next(scene for scene in SCENES if scene.name == "stomach_press")
-    (sentence,) = warnings_of(scene, mesh_of(scene, BodyRecipe(nodes=400)))
+    (sentence,) = warnings_of(scene, mesh_of(scene, TetrahedralBody(nodes=400)))
     assert "'cardia' -4 %" in sentence and "'pylorus' -4.1 %" in sentence
 
 
 @pytest.mark.campaign
 @pytest.mark.parametrize("scene", ORGANS, ids=lambda scene: scene.name)
 def test_curved_bodies_hold_the_area_that_their_scene_holds(mesh_cache, scene):
-    mesh = mesh_of(scene, BodyRecipe("quadratic", 794))
+    mesh = mesh_of(scene, QuadraticBody(794))
     assert [held.name for held in scene.held if abs(held_area_error(scene, mesh, held)) > 0.03] == []
 
 

@@ -16,7 +16,8 @@ from studies.metrics.run import Run
 from studies.reference.load import Reference
 from studies.reference.reference_solves import ReferenceSolve
 from studies.reference.solve import solve
-from studies.runs.case import BodyRecipe, Case
+from studies.runs.case import Case
+from studies.runs.recipes import QuadraticBody
 from studies.runs.run import measure
 from studies.scene.library.spleen_sag import SPLEEN_SAG
 from studies.scene.placing import press_times, scaled
@@ -54,7 +55,7 @@ def test_a_liver_nobody_has_seen(member, mesh_cache, tmp_path, monkeypatch):
     """Against a reference of its own (docs/accuracy.md)."""
     scene = pressed(member)
     truth = last_force(scene, read_record(solve(tmp_path, ReferenceSolve(scene))))
-    body = BodyRecipe("quadratic", 794, graded=True, mass="stiffness")
+    body = QuadraticBody(794, graded=True, mass="stiffness")
 
     def error() -> float:
         return abs(last_force(scene, measure(Case(scene, body, dt_fraction=0.8))) / truth - 1)
@@ -77,7 +78,7 @@ def test_a_spleen_nobody_has_seen_hangs(seed, mesh_cache, tmp_path, monkeypatch)
         reference=ReferencePlan(base=400, variants=()),
     )
     truth = Reference(scene, read_record(solve(tmp_path, ReferenceSolve(scene))))
-    case = Case(scene, BodyRecipe("quadratic", 994, graded=True, mass="stiffness"), dt_fraction=0.8)
+    case = Case(scene, QuadraticBody(994, graded=True, mass="stiffness"), dt_fraction=0.8)
 
     def error() -> float:
         record = measure(case)

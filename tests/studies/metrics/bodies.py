@@ -6,17 +6,18 @@ import numpy as np
 
 from massspring import Body
 from studies.metrics.run import Run
-from studies.runs.case import BodyRecipe, Case
+from studies.runs.case import Case
 from studies.runs.prepare import prepare
+from studies.runs.recipes import BODIES, BodyRecipe, QuadraticBody
 from studies.scene.library.ball_clamped import BALL_CLAMPED
 from studies.scene.library.liver_press import LIVER_PRESS
 from studies.scene.scene import Organ, Scene
 from tests.studies import made_up_run
 
-LIVER = BodyRecipe("quadratic", 794, graded=True, mass="stiffness")
+LIVER = QuadraticBody(794, graded=True, mass="stiffness")
 """The body that was recommended for liver_press when it lacked 26 mm of the left lobe."""
 
-COARSE = BodyRecipe("quadratic", 594, mass="stiffness")
+COARSE = QuadraticBody(594, mass="stiffness")
 """Meshed in seconds."""
 
 
@@ -37,7 +38,7 @@ def rest_run(scene: Scene, recipe: BodyRecipe, body: Body, rest: np.ndarray | No
 def ball_run(body: Body, rest: np.ndarray | None = None, kind: str = "quadratic", radius: float = 0.05) -> Run:
     """Such a run whose organ is a ball."""
     scene = replace(BALL_CLAMPED, organ=Organ("ball", {"radius": radius}))
-    return rest_run(scene, BodyRecipe(kind), body, rest)  # pyright: ignore[reportArgumentType]
+    return rest_run(scene, BODIES[kind](), body, rest)
 
 
 def liver_runs(*stretches: tuple[float, float, float]) -> list[Run]:

@@ -7,7 +7,7 @@ import pytest
 
 from massspring import Plane
 from studies.metrics.metrics import contact_facets, contact_turn
-from studies.runs.case import BodyRecipe
+from studies.runs.recipes import TetrahedralBody
 from studies.scene.scene import ForceOutput
 from tests.studies import made_up_run
 
@@ -24,7 +24,7 @@ def pressed(height, force=(0.0, 0.0, -2.0)):
         obstacles=(Plane((0.0, 0.0, height), PUSH),),
         probed=ForceOutput("obstacle", 0, PUSH),
     )
-    return replace(made, case=replace(made.case, scene=scene, body=BodyRecipe()))
+    return replace(made, case=replace(made.case, scene=scene, body=TetrahedralBody()))
 
 
 def test_facets_are_counted_that_reach_the_plane():

@@ -8,10 +8,11 @@ import pytest
 from massspring import ImplicitElements, ImplicitVolume
 from studies.metrics.judged import Judged, Measured, cheapest, over_meshes
 from studies.metrics.wish import Wish
-from studies.runs.case import BodyRecipe, Case, neighbours
+from studies.runs.case import Case
+from studies.runs.recipes import QuadraticBody, TetrahedralBody, neighbours
 from studies.scene.library import LIVER_PROBE
 
-BODY = BodyRecipe("quadratic", 794)
+BODY = QuadraticBody(794)
 FORCES, MEANS = (0.5, -4.0, 1.0, 2.0, 3.0), (0.2, 0.4, 0.3, 1.5, 0.1)
 WISH = Wish(force=3.0, displacement=1.0)
 
@@ -46,7 +47,7 @@ def test_a_recipe_that_is_right_on_four_meshes_is_not_recommended():
 
 def test_a_quadratic_recipe_on_one_mesh_is_no_answer_where_others_ran_on_five():
     single = row(replace(BODY, contact="nodes"), 0.1, 0.1, cost=0.01)
-    linear = row(BodyRecipe(nodes=550), 30.0, 10.0)
+    linear = row(TetrahedralBody(nodes=550), 30.0, 10.0)
     rows = over_meshes([*five(), single, linear])
     assert [one.case.body for one in rows] == [BODY, linear.case.body]
     assert over_meshes([single, linear]) == [single, linear]  # alone it counts, with a remark

@@ -13,7 +13,7 @@ from studies.meshing.bounds import SHAPE, SHAPE_VOLUME
 from studies.meshing.rest_surface import LUMEN, OUTER, rest_surfaces
 from studies.meshing.true_surface import shape_errors, true_surface
 from studies.metrics.table import metric, study_table
-from studies.runs.case import BodyRecipe
+from studies.runs.recipes import TetrahedralBody
 from studies.scene.library import LIVER_PRESS
 from studies.scene.scene import Organ
 from studies.tools.advise.answer import advise
@@ -114,7 +114,7 @@ def test_a_mesh_file_that_comes_as_it_is_is_the_truth(tmp_path):
     points, triangles, cells = cube()
     body = tetrahedral_body(points, triangles, cells, SOFT)
     scene = file_scene(write_obj(tmp_path / "cube.obj", points, triangles))
-    run = replace(ball_run(body), case=replace(ball_run(body).case, scene=scene, body=BodyRecipe()))
+    run = replace(ball_run(body), case=replace(ball_run(body).case, scene=scene, body=TetrahedralBody()))
     assert shape_of(run) == pytest.approx((0.0, 0.0), abs=1e-9)
 
 
@@ -125,7 +125,7 @@ def test_without_its_file_a_body_has_no_shape_error(tmp_path):
     file.unlink()
     run = ball_run(tetrahedral_body(points, triangles, cells, SOFT))
     with pytest.warns(UserWarning, match=r"the shape of bodies is not measured: .*gone\.obj"):
-        assert np.isnan(shape_of(replace(run, case=replace(run.case, scene=scene, body=BodyRecipe())))).all()
+        assert np.isnan(shape_of(replace(run, case=replace(run.case, scene=scene, body=TetrahedralBody())))).all()
 
 
 def test_a_record_whose_facets_are_in_another_order_has_no_shape(ball):

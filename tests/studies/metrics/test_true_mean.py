@@ -10,6 +10,7 @@ from studies.meshing.bounds import SHAPE
 from studies.meshing.rest_surface import OUTER, RestSurface, rest_surfaces
 from studies.metrics.table import metric
 from studies.reference.solution import Boundary, Solution
+from studies.runs.recipes import QuadraticBody, TetrahedralBody
 from studies.scene.library.ball_squeeze import RADIUS as BALL
 from studies.store.record import Field
 from tests.massspring.conftest import SOFT
@@ -78,7 +79,7 @@ def test_between_the_nodes_of_curved_facets_the_displacement_is_quadratic():
     still = ball_run(body)
     values = still.record.fields | {"snapshots": Field((body.rest + swell(body.rest))[None], "m", "")}
     curved = replace(still, record=replace(still.record, fields=values), reference=truth)
-    flat = replace(curved, case=replace(curved.case, body=replace(curved.case.body, kind="tetrahedral")))
+    flat = replace(curved, case=replace(curved.case, body=TetrahedralBody()))
     assert metric("mean_error")(curved) < 0.3 < 3 * metric("mean_error")(curved) < metric("mean_error")(flat)
 
 
@@ -104,7 +105,7 @@ def test_a_surface_body_of_a_hollow_organ_is_compared_with_the_outer_surface():
 
 def test_a_quadratic_record_with_linear_facets_has_no_mean_error():
     made = run()
-    odd = replace(made, case=replace(made.case, body=replace(made.case.body, kind="quadratic")))
+    odd = replace(made, case=replace(made.case, body=QuadraticBody()))
     assert np.isnan(metric("mean_error")(odd))
 
 

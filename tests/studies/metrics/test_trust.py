@@ -12,8 +12,8 @@ from studies.geometry import HalfSpace
 from studies.meshing.kept_shape import tell_shape
 from studies.metrics.trust import FEW_FACETS, Apart, apart, doubt, verdicts, within
 from studies.metrics.wish import Wish
-from studies.runs.case import BodyRecipe
 from studies.runs.prepare import mesh_of
+from studies.runs.recipes import QuadraticBody, SurfaceBody
 from studies.scene.cut import Cut
 from studies.scene.library.liver_probe import LIVER_PROBE
 from studies.scene.library.spleen_sag import SPLEEN_SAG
@@ -21,7 +21,7 @@ from studies.store.record import Status
 from tests.studies import made_up_run
 from tests.studies.tiny import tiny_study
 
-FINE = BodyRecipe("quadratic", 1594, graded="adaptive")
+FINE = QuadraticBody(1594, graded="adaptive")
 COARSE = replace(FINE, nodes=1194)
 BALL = made_up_run.SCENE
 WISH = Wish(3.0, 1.0)
@@ -59,7 +59,7 @@ def test_both_must_be_within_a_share_of_the_wish(share, force, displacement, tru
 
 
 def test_a_verdict_names_both_meshes_and_both_numbers():
-    (verdict,) = verdicts([body_run(FINE), body_run(COARSE, force=1.02, shift=0.9), body_run(BodyRecipe("surface"))])
+    (verdict,) = verdicts([body_run(FINE), body_run(COARSE, force=1.02, shift=0.9), body_run(SurfaceBody())])
     assert not verdict.trusted and verdict.scene == "ball_clamped"
     why = "two meshes (1,194 and 1,594 nodes) differ by 2 % in force and 10 % in displacement; allowed: 1.5 times"
     assert verdict.why == f"{why} the target"
@@ -109,7 +109,7 @@ def test_the_study_of_a_scene_takes_the_nodes_that_its_warning_needs(scene):
 def test_a_body_that_warns_of_few_facets_is_not_trusted_however_near_two_meshes_are():
     """The words are those of the warning before the run."""
     with pytest.warns(UserWarning, match=FEW_FACETS) as records:
-        tell_shape(LIVER_PROBE, mesh_of(LIVER_PROBE, BodyRecipe("quadratic", 394)), filled=True)
+        tell_shape(LIVER_PROBE, mesh_of(LIVER_PROBE, QuadraticBody(394)), filled=True)
     (warning,) = [text for record in records if FEW_FACETS in (text := str(record.message))]
     fine = body_run(FINE)
     attributes = {**fine.record.attributes, "warnings": warning}

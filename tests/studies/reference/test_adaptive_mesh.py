@@ -17,12 +17,13 @@ from studies.meshing.nested_mesh import edges_of, marked
 from studies.meshing.scene_mesh import mesh_for
 from studies.reference import adaptive_mesh as module
 from studies.reference.adaptive_mesh import STRAIN, adapted, adaptive_mesh, coarse_mesh, indicators_of, least_edge
-from studies.runs.case import BodyRecipe, Case, case_from_json
+from studies.runs.case import Case, case_from_json
 from studies.runs.prepare import mesh_of
+from studies.runs.recipes import BODIES, QuadraticBody
 from studies.scene.library import BALL_CLAMPED, BALL_RINGING, BALL_SQUEEZE, LIVER_PROBE, SPLEEN_SAG
 
 NODES = 594
-BODY = BodyRecipe("quadratic", NODES, graded="adaptive", mass="stiffness")
+BODY = QuadraticBody(NODES, graded="adaptive", mass="stiffness")
 
 
 @pytest.fixture(scope="module")
@@ -166,7 +167,7 @@ def test_a_coarse_body_without_an_equilibrium_is_a_sentence(monkeypatch):
 @pytest.mark.parametrize("kind", ["tetrahedral", "surface"])
 def test_other_bodies_are_not_adapted(kind):
     with pytest.raises(StudyError, match="graded"):
-        BodyRecipe(kind, graded="adaptive")
+        BODIES[kind](graded="adaptive")
 
 
 def test_a_recipe_is_stored_and_named():

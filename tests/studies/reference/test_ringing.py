@@ -9,8 +9,8 @@ from massspring import Body, Clock, ImplicitVolume, Setup, step_limit
 from massspring.analysis.modes import natural_frequencies
 from reference_fem import exact
 from studies.meshing.scene_mesh import mesh_for
-from studies.runs.case import BodyRecipe
 from studies.runs.prepare import body_for
+from studies.runs.recipes import TetrahedralBody
 from studies.scene.library.ball_squeeze import BALL_SQUEEZE, RADIUS
 
 TISSUE = BALL_SQUEEZE.tissue
@@ -22,7 +22,7 @@ NODES = 550
 
 @cache
 def ball(law: str, volumes: str, nodes: int = NODES) -> Body:
-    recipe = BodyRecipe(nodes=nodes, law=law, volumes=volumes)
+    recipe = TetrahedralBody(nodes=nodes, law=law, volumes=volumes)
     return body_for(BALL_SQUEEZE, recipe, mesh_for(BALL_SQUEEZE, nodes))
 
 

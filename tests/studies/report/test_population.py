@@ -7,11 +7,12 @@ import pytest
 
 from studies.metrics.trust import judgements, tally
 from studies.report.population import members_of, rigid_share, trust_of, worst_of
-from studies.runs.case import BodyRecipe, Case
+from studies.runs.case import Case
+from studies.runs.recipes import QuadraticBody
 from studies.store.record import Status
 from tests.studies.made_up_run import POINTS, SCENE, bend, run
 
-FINE = BodyRecipe("quadratic", 1594, graded="adaptive")
+FINE = QuadraticBody(1594, graded="adaptive")
 COARSE = replace(FINE, nodes=1194)
 
 

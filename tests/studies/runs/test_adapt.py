@@ -9,8 +9,8 @@ from massspring import MassSpringError, Trajectory
 from studies.base.errors import StudyError
 from studies.geometry import HalfSpace
 from studies.meshing.scene_mesh import mesh_for, patch_nodes
-from studies.runs.case import BodyRecipe
 from studies.runs.prepare import attachments_for, body_for, prepare
+from studies.runs.recipes import BODIES, MembraneBody, TetrahedralBody
 from studies.scene.library import Held
 from studies.scene.library.ball_clamped import BALL_CLAMPED
 from studies.scene.library.bladder_fill import BLADDER_FILL
@@ -26,7 +26,7 @@ def ball_mesh(mesh_cache):
 
 
 def test_only_a_tetrahedral_body_is_filled():
-    filled, hollow = (prepare(tiny_case(body=BodyRecipe(kind, NODES))) for kind in ("tetrahedral", "surface"))
+    filled, hollow = (prepare(tiny_case(body=BODIES[kind](NODES))) for kind in ("tetrahedral", "surface"))
     assert len(filled.mesh.tetrahedra) == len(filled.setup.body.tetrahedra) > 0
     assert len(hollow.mesh.tetrahedra) == len(hollow.setup.body.tetrahedra) == 0
     assert abs(hollow.mesh.surface_count - NODES) <= 0.02 * NODES + 1
@@ -35,7 +35,7 @@ def test_only_a_tetrahedral_body_is_filled():
 
 
 def test_stiffness_multiplies_every_spring(ball_mesh):
-    soft, stiff = (body_for(CLAMPED, BodyRecipe(nodes=NODES, stiffness=k), ball_mesh) for k in (1.0, 4.0))
+    soft, stiff = (body_for(CLAMPED, TetrahedralBody(nodes=NODES, stiffness=k), ball_mesh) for k in (1.0, 4.0))
     np.testing.assert_allclose(stiff.springs.stiffness, 4.0 * soft.springs.stiffness, rtol=1e-15)
     np.testing.assert_array_equal(stiff.mass, soft.mass)
 
@@ -45,14 +45,14 @@ def test_the_masses_add_up_to_density_times_volume(ball_mesh, kind):
     """A body of the scene's tissue, whatever the stiffness; sums of a few hundred terms round far below 1e-12."""
     dense = replace(CLAMPED, tissue=replace(CLAMPED.tissue, density=1234.5))
     for scene in (CLAMPED, dense):
-        body = body_for(scene, BodyRecipe(kind, NODES, stiffness=3.0), ball_mesh)
+        body = body_for(scene, BODIES[kind](NODES, stiffness=3.0), ball_mesh)
         assert body.mass.sum() == pytest.approx(scene.tissue.density * ball_mesh.volume, rel=1e-12)
 
 
 def test_a_membrane_weighs_as_much_as_wall_and_content(mesh_cache):
     """The content has the tissue's density (wall_for): together the density times all that the outer surface holds."""
     mesh = mesh_for(BLADDER_FILL, 400)
-    body = body_for(BLADDER_FILL, BodyRecipe("membrane", 400, law="delingette"), mesh)
+    body = body_for(BLADDER_FILL, MembraneBody(400, law="delingette"), mesh)
     assert body.mass.sum() == pytest.approx(BLADDER_FILL.tissue.density * mesh.outer_volume, rel=1e-9)
 
 
@@ -60,7 +60,7 @@ def test_the_laws_differ_and_match_the_tissue(ball_mesh):
     """Both have Σ k L² = 15 μ V, so that they mean the same tissue (docs: stiffness laws)."""
     volume, shear = ball_mesh.volume, CLAMPED.tissue.shear_modulus
     springs = [
-        body_for(CLAMPED, BodyRecipe(nodes=NODES, law=law), ball_mesh).springs for law in ("van_gelder", "uniform")
+        body_for(CLAMPED, TetrahedralBody(nodes=NODES, law=law), ball_mesh).springs for law in ("van_gelder", "uniform")
     ]
     for network in springs:
         assert network.stiffness @ network.rest_length**2 == pytest.approx(15 * shear * volume, rel=1e-9)
@@ -108,7 +108,7 @@ def test_a_file_may_ask_for_a_new_surface(tmp_path):
 
 
 def test_dt_auto_is_the_fraction_of_the_limit_of_the_held_body():
-    case = tiny_case(scene=CLAMPED, body=BodyRecipe(nodes=100))
+    case = tiny_case(scene=CLAMPED, body=TetrahedralBody(nodes=100))
     half, tenth = prepare(case), prepare(case.replaced(dt_fraction=0.1))
     for prepared, fraction in ((half, 0.5), (tenth, 0.1)):
         clock = prepared.setup.clock

@@ -12,8 +12,9 @@ from studies.meshing.graded_mesh import MIDDLE, halved
 from studies.meshing.scene_mesh import mesh_for
 from studies.meshing.shaping import quadratic_mesh
 from studies.reference.published import physics, published
-from studies.runs.case import BodyRecipe, Case
+from studies.runs.case import Case
 from studies.runs.prepare import Prepared, prepared_on
+from studies.runs.recipes import QuadraticBody, TetrahedralBody
 from studies.runs.run import measure
 from studies.scene.as_json import scene_from_dict, scene_to_dict
 from studies.scene.checks import check_scene
@@ -25,9 +26,9 @@ from tests.campaigns import campaigns_but
 ALONG = (1.0, 0.0, 0.0)
 UNTIL = 2.0
 BODIES = {
-    "one": BodyRecipe(nodes=120),
-    "cotangent": BodyRecipe(nodes=120, law="cotangent", volumes="nodal"),
-    "quadratic": BodyRecipe("quadratic", nodes=4 * 100 - 6),
+    "one": TetrahedralBody(nodes=120),
+    "cotangent": TetrahedralBody(nodes=120, law="cotangent", volumes="nodal"),
+    "quadratic": QuadraticBody(nodes=4 * 100 - 6),
 }
 
 

@@ -8,7 +8,16 @@ import pytest
 from massspring import METHODS, Element, Free, ImplicitVolume, Penalty, Xpbd
 from studies.base.errors import StudyError
 from studies.catalog import STUDIES
-from studies.runs.case import BodyRecipe, Case, case_from_json, case_to_dict
+from studies.runs.case import Case, case_from_json, case_to_dict
+from studies.runs.recipes import (
+    BODIES,
+    BodyRecipe,
+    MembraneBody,
+    QuadraticBody,
+    SurfaceBody,
+    TetrahedralBody,
+    recipe_from_dict,
+)
 from studies.scene.library import SCENES
 from tests.studies.tiny import tiny_case
 
@@ -18,15 +27,15 @@ CHANGES = {
     "tissue": {"scene": replace(SCENES[0], tissue=replace(SCENES[0].tissue, shear_modulus=1801.0))},
     "obstacle": {"scene": replace(SCENES[0], obstacles=SCENES[0].obstacles[:1])},
     "checkpoint": {"scene": replace(SCENES[0], checkpoints=(1.0, 4.0))},
-    "kind": {"body": BodyRecipe("surface")},
-    "nodes": {"body": BodyRecipe(nodes=551)},
-    "law": {"body": BodyRecipe(law="uniform")},
-    "weights": {"body": BodyRecipe("surface", weights=(1.0, 0.5, 0.25, 1.0))},
-    "stiffness": {"body": BodyRecipe(stiffness=1.01)},
-    "quadratic": {"body": BodyRecipe("quadratic")},
-    "graded": {"body": BodyRecipe(graded=True)},
-    "mass": {"body": BodyRecipe("quadratic", graded=True, mass="stiffness")},
-    "cut": {"body": BodyRecipe(cut="virtual")},
+    "kind": {"body": SurfaceBody()},
+    "nodes": {"body": TetrahedralBody(nodes=551)},
+    "law": {"body": TetrahedralBody(law="uniform")},
+    "weights": {"body": SurfaceBody(weights=(1.0, 0.5, 0.25, 1.0))},
+    "stiffness": {"body": TetrahedralBody(stiffness=1.01)},
+    "quadratic": {"body": QuadraticBody()},
+    "graded": {"body": TetrahedralBody(graded=True)},
+    "mass": {"body": QuadraticBody(graded=True, mass="stiffness")},
+    "cut": {"body": TetrahedralBody(cut="virtual")},
     "method": {"method": Free()},
     "dt": {"dt": 1e-4},
     "dt_fraction": {"dt_fraction": 0.51},
@@ -49,7 +58,7 @@ def test_key_read_back_is_the_same_case(scene, method):
     precision = "float32" if method().capabilities.float32 else "float64"
     for case in (
         Case(scene, method=method()),
-        Case(scene, BodyRecipe("surface", 80, stiffness=2.5), method(), 1e-3, 0.7, 12, precision=precision),
+        Case(scene, SurfaceBody(80, stiffness=2.5), method(), 1e-3, 0.7, 12, precision=precision),
     ):
         again = case_from_json(case.key)
         assert again == case
@@ -76,9 +85,9 @@ def test_names_are_readable_and_distinct_within_a_study():
         names = [case.name for case in study.cases]
         assert len(set(names)) == len(names)
     assert Case(SCENES[0]).name == "ball_squeeze-tetrahedral-550-implicit_volume-dt0.5"
-    other = Case(SCENES[0], BodyRecipe(law="uniform", stiffness=4.0), Free(), dt=2e-3)
+    other = Case(SCENES[0], TetrahedralBody(law="uniform", stiffness=4.0), Free(), dt=2e-3)
     assert other.name == "ball_squeeze-tetrahedral-550-free-dt2ms-uniform-k4"
-    weighted = Case(SCENES[0], BodyRecipe("surface", weights=(1.0, 0.5, 0.25, 1.0)), Free())
+    weighted = Case(SCENES[0], SurfaceBody(weights=(1.0, 0.5, 0.25, 1.0)), Free())
     assert weighted.name == "ball_squeeze-surface-550-free-dt0.5-w1_0.5_0.25_1"
 
 
@@ -94,40 +103,67 @@ def test_a_precision_that_the_method_does_not_claim_is_refused(method, precision
         Case(SCENES[0], method=method, precision=precision)
 
 
-def test_a_setting_that_is_not_chosen_leaves_old_keys_as_they_were():
-    """The key of the first scene's default case as it was before surface weights could be chosen."""
-    assert "weights" not in json.loads(Case(SCENES[0]).key)["body"]
-    assert "precision" not in json.loads(Case(SCENES[0]).key)
-    assert not {"graded", "mass", "cut"} & set(json.loads(Case(SCENES[0]).key)["body"])
-    assert set(json.loads(Case(SCENES[0]).key)["method"]["settings"]) == {"tolerance", "most_iterations"}
-    assert json.loads(Case(SCENES[0], method=ImplicitVolume(recovers=True)).key)["method"]["settings"]["recovers"]
+# What release 0.3 wrote for every kind, and what it left out where it was the default.
+SHARED = {"nodes": 80, "law": "van_gelder", "stiffness": 1.0, "volumes": "scene", "regions": 26, "axis": "straight"}
+LEFT_OUT = {"weights": None, "graded": False, "mass": "lumped", "contact": "facets", "cut": "conforming"}
+
+
+@pytest.mark.parametrize("more", [{}, LEFT_OUT], ids=["short", "long"])
+@pytest.mark.parametrize("kind", ["tetrahedral", "surface", "quadratic"])
+def test_a_recipe_of_release_0_3_is_read(kind, more):
+    old = SHARED | more | {"kind": kind}
+    assert recipe_from_dict(old) == (TetrahedralBody(80, regions=26) if kind == "tetrahedral" else BODIES[kind](80))
+    assert recipe_from_dict(old | {"stiffness": 2.0}).stiffness == 2.0
+    with pytest.raises(StudyError, match="has no setting 'sides'"):
+        recipe_from_dict(old | {"sides": 3})
+    if kind != "tetrahedral":
+        with pytest.raises(StudyError, match=f"a {kind} body has no setting 'law'"):
+            recipe_from_dict(old | {"law": "uniform"})
+
+
+def test_a_method_of_release_0_3_is_read():
+    """Without the settings that it left out where they were the default."""
+    data = json.loads(Case(SCENES[0]).key)
+    del data["method"]["settings"]["recovers"]
+    assert case_from_json(json.dumps(data)) == Case(SCENES[0])
 
 
 def test_grading_and_masses_stand_in_names_and_series():
-    assert Case(SCENES[0], BodyRecipe(graded=True)).name == "ball_squeeze-tetrahedral-550-implicit_volume-dt0.5-graded"
-    body = BodyRecipe("quadratic", 800, graded=True, mass="stiffness")
+    filled = Case(SCENES[0], TetrahedralBody(graded=True))
+    assert filled.name == "ball_squeeze-tetrahedral-550-implicit_volume-dt0.5-graded"
+    body = QuadraticBody(800, graded=True, mass="stiffness")
     assert Case(SCENES[0], body).name == "ball_squeeze-quadratic-800-implicit_volume-dt0.5-graded-stiffness_mass"
     assert body.series == "graded quadratic, masses by stiffness"
-    assert BodyRecipe(volumes="nodal", graded=True).series == "graded tetrahedral, nodal volumes"
-    virtual = Case(SCENES[0], BodyRecipe(cut="virtual"))
+    assert TetrahedralBody(volumes="nodal", graded=True).series == "graded tetrahedral, nodal volumes"
+    virtual = Case(SCENES[0], TetrahedralBody(cut="virtual"))
     assert virtual.name == "ball_squeeze-tetrahedral-550-implicit_volume-dt0.5-virtual_nodes"
     assert virtual.body.series == "tetrahedral, virtual nodes"
 
 
 @pytest.mark.parametrize(
-    ("recipe", "message"),
+    ("kind", "settings", "message"),
     [
-        ({"kind": "surface", "graded": True}, "a surface body cannot be graded; choose kind 'tetrahedral' or"),
-        ({"kind": "membrane", "law": "delingette", "graded": True}, "a membrane body cannot be graded"),
-        ({"mass": "stiffness"}, "a tetrahedral body has no masses by stiffness; choose kind 'quadratic'"),
-        ({"kind": "quadratic", "cut": "virtual"}, "a quadratic body is not cut by virtual nodes; choose kind"),
-        ({"kind": "quadratic", "volumes": "regions"}, "one volume per vertex, not volumes 'regions'; leave"),
-        ({"kind": "quadratic", "law": "uniform"}, "follow no law, not 'uniform' either; leave the law out"),
+        (BodyRecipe, {}, r"a BodyRecipe is of one kind; write one of TetrahedralBody\(...\), SurfaceBody"),
+        (
+            SurfaceBody,
+            {"graded": True},
+            "no setting 'graded'; it has nodes, stiffness, axis, weights",
+        ),
+        (MembraneBody, {"volumes": "nodal"}, "a membrane body has no setting 'volumes'"),
+        (
+            MembraneBody,
+            {"law": "uniform"},
+            "law of a membrane 'uniform'; known are delingette, lloyd",
+        ),
+        (TetrahedralBody, {"mass": "stiffness"}, "a tetrahedral body has no setting 'mass'"),
+        (TetrahedralBody, {"graded": "adaptive"}, "not graded by a solution; take a QuadraticBody"),
+        (QuadraticBody, {"cut": "virtual"}, "a quadratic body has no setting 'cut'"),
+        (QuadraticBody, {"law": "uniform"}, "a quadratic body has no setting 'law'"),
     ],
 )
-def test_settings_of_a_body_that_do_not_go_together_are_refused(recipe, message):
+def test_a_setting_of_another_kind_is_refused(kind, settings, message):
     with pytest.raises(StudyError, match=message):
-        BodyRecipe(**recipe)
+        kind(**settings)
 
 
 UNREADABLE = {

@@ -17,8 +17,9 @@ from studies.reference.nested import solve_nested
 from studies.reference.reference_solves import ReferenceSolve
 from studies.reference.sample import parted
 from studies.reference.solve import solve
-from studies.runs.case import BodyRecipe, Case
+from studies.runs.case import Case
 from studies.runs.prepare import prepare
+from studies.runs.recipes import QuadraticBody, SurfaceBody, TetrahedralBody
 from studies.runs.run import measure
 from studies.scene.library.ball_bisected import BALL_BISECTED
 from studies.scene.library.ball_incised import BALL_INCISED
@@ -28,8 +29,8 @@ from tests.campaigns import campaign
 
 pytestmark = pytest.mark.slow
 METRIC = {metric.name: metric for metric in METRICS}
-ONE, QUADRATIC, SURFACE = BodyRecipe(nodes=200), BodyRecipe("quadratic", nodes=600), BodyRecipe("surface", nodes=200)
-NODAL = BodyRecipe(nodes=200, law="cotangent", volumes="nodal")
+ONE, QUADRATIC, SURFACE = TetrahedralBody(nodes=200), QuadraticBody(nodes=600), SurfaceBody(nodes=200)
+NODAL = TetrahedralBody(nodes=200, law="cotangent", volumes="nodal")
 
 
 @pytest.fixture(scope="module")

@@ -7,8 +7,9 @@ import pytest
 
 from massspring import Capsule, Free, ImplicitVolume, Plane, Sphere, Trajectory
 from studies.report.kept_volume import PROMISED, kept_volumes, promised, worst_volume
-from studies.runs.case import BodyRecipe, Case
+from studies.runs.case import Case
 from studies.runs.current import case_path
+from studies.runs.recipes import SurfaceBody, TetrahedralBody
 from studies.runs.run import measure
 from studies.scene.library import BALL_CLAMPED, BALL_SQUEEZE, BLADDER_FILL, JUDGED, LIVER_PRESS
 from studies.store.ledger import Ledger
@@ -25,7 +26,7 @@ STATIC = 1e-6
 
 def record_of(scene, volumes, kind="tetrahedral"):
     nodes = NODES_OF.get(scene.name, 400 if scene.lumen else 150)
-    recipe = BodyRecipe(kind, nodes, volumes=volumes, regions=32)
+    recipe = SurfaceBody(nodes) if kind == "surface" else TetrahedralBody(nodes, volumes=volumes)
     return measure(Case(scene, recipe, ImplicitVolume(), frames=FRAMES))
 
 
@@ -81,7 +82,7 @@ def test_contact_held_still_loses_nothing(obstacle, volumes):
     scene = replace(SQUEEZE, obstacles=(pressing,), held=(BALL_CLAMPED.held[0],), damping=40.0)
     # What an iterative solve may leave is set apart: ten times less than what is looked for.
     method = ImplicitVolume(tolerance=0.1 * STATIC)
-    record = measure(Case(scene, BodyRecipe(nodes=HELD_NODES, volumes=volumes), method, frames=20))
+    record = measure(Case(scene, TetrahedralBody(nodes=HELD_NODES, volumes=volumes), method, frames=20))
     assert record.status == Status.OK and np.abs(record.fields["contact_force"].values[-1, 0]).max() > 0.1
     # The path ends at 1 of 4 s; what is left of the swing is looked at in the last second.
     error = np.abs(record.fields["volume"].values[-5:] / record.fields["volume_target"].values[-5:] - 1)

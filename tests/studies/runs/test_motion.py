@@ -17,8 +17,9 @@ from studies.reference.problem import rigid
 from studies.reference.reference_solves import ReferenceSolve
 from studies.reference.ringing import fitted_frequency
 from studies.reference.solve import solve
-from studies.runs.case import BodyRecipe, Case
+from studies.runs.case import Case
 from studies.runs.prepare import prepare
+from studies.runs.recipes import TetrahedralBody
 from studies.runs.run import measure
 from studies.scene.library import Lumen, ReferencePlan
 from studies.scene.library.ball_ringing import BALL_RINGING, RADIUS
@@ -84,7 +85,7 @@ def test_the_energy_of_the_motion_is_kept(reference):
 
 @pytest.mark.campaign
 def test_a_mass_spring_ball_is_judged_by_its_frequency(reference):
-    case = Case(SCENE, BodyRecipe("tetrahedral", 150, volumes="nodal"))
+    case = Case(SCENE, TetrahedralBody(150, volumes="nodal"))
     record = measure(case)
     assert record.status == Status.OK
     error = frequency_error(Run(case, record, reference))
@@ -95,7 +96,7 @@ def test_a_mass_spring_ball_is_judged_by_its_frequency(reference):
 
 
 def test_both_solvers_start_with_the_same_speed():
-    prepared = prepare(Case(SCENE, BodyRecipe("tetrahedral", 150)))
+    prepared = prepare(Case(SCENE, TetrahedralBody(150)))
     rest = prepared.setup.body.rest
     assert prepared.setup.positions is None
     assert SCENE.start is not None

@@ -11,8 +11,9 @@ from studies.geometry import BallRegion, organ
 from studies.geometry.mesh.organ_mesh import boundary_triangles, tetrahedron_volumes, triangle_areas, unique_edges
 from studies.meshing.opened_mesh import opened_mesh
 from studies.meshing.scene_mesh import mesh_for
-from studies.runs.case import BodyRecipe, Case
+from studies.runs.case import Case
 from studies.runs.prepare import mesh_of, prepare, prepared_on
+from studies.runs.recipes import MembraneBody, QuadraticBody, SurfaceBody, TetrahedralBody
 from studies.scene.checks import check_scene
 from studies.scene.library import BALL_CLAMPED, SHELL_OPENED
 from studies.scene.library.ball_incised import RADIUS
@@ -22,9 +23,9 @@ from tests.campaigns import campaigns_but
 
 NODES = 250
 BODIES = {
-    "wall": BodyRecipe(nodes=NODES),
-    "nodal": BodyRecipe(nodes=NODES, law="cotangent", volumes="nodal"),
-    "quadratic": BodyRecipe("quadratic", nodes=354, mass="stiffness"),
+    "wall": TetrahedralBody(nodes=NODES),
+    "nodal": TetrahedralBody(nodes=NODES, law="cotangent", volumes="nodal"),
+    "quadratic": QuadraticBody(nodes=354, mass="stiffness"),
 }
 OPEN, FULL = Lumen("open"), Lumen(filling=Ramp((0.0, 0.7), (1.0, 1.15)))
 
@@ -119,10 +120,10 @@ def test_what_no_cut_opens_is_refused():
         with pytest.raises(StudyError, match=sentence):
             check_scene(scene)
     for body, sentence in (
-        (BodyRecipe("membrane", nodes=NODES), "which a membrane body cannot do yet"),
-        (BodyRecipe("surface", nodes=NODES), "which a surface body cannot do yet"),
-        (BodyRecipe(nodes=NODES, cut="virtual"), "virtual nodes do not apply .* whose cut opens a lumen"),
-        (BodyRecipe(nodes=NODES, volumes="whole"), "keeps wall and content as one volume; keep them apart"),
+        (MembraneBody(nodes=NODES), "which a membrane body cannot do yet"),
+        (SurfaceBody(nodes=NODES), "which a surface body cannot do yet"),
+        (TetrahedralBody(nodes=NODES, cut="virtual"), "virtual nodes do not apply .* whose cut opens a lumen"),
+        (TetrahedralBody(nodes=NODES, volumes="whole"), "keeps wall and content as one volume; keep them apart"),
     ):
         with pytest.raises(StudyError, match=sentence):
             prepare(Case(SHELL_OPENED, body))

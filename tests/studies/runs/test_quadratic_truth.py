@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from reference_fem import exact
-from studies.runs.case import BodyRecipe, Case
+from studies.runs.case import Case
+from studies.runs.recipes import QuadraticBody
 from studies.runs.run import measure
 from studies.scene.library.ball_squeeze import BALL_SQUEEZE, DEPTH, PRESS_END, RADIUS
 from studies.store.record import Status
@@ -19,7 +20,7 @@ def errors(contact: str, fraction: float) -> tuple[np.ndarray, np.ndarray]:
 
     The ball may drift sideways, so its radius is half of its width.
     """
-    recipe = BodyRecipe("quadratic", 4 * VERTICES - 6, mass="stiffness", contact=contact)  # pyright: ignore[reportArgumentType]
+    recipe = QuadraticBody(4 * VERTICES - 6, mass="stiffness", contact=contact)  # pyright: ignore[reportArgumentType]
     record = measure(Case(BALL_SQUEEZE, recipe, dt_fraction=fraction))
     assert record.status == Status.OK, record.message
     t, force = record.fields["t"].values, record.fields["contact_force"].values[:, 0, 2]

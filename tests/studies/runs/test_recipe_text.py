@@ -5,8 +5,9 @@ import pytest
 from massspring import Free, Xpbd
 from studies.base.errors import StudyError
 from studies.catalog import STUDIES
-from studies.runs.case import BodyRecipe, Case
+from studies.runs.case import Case
 from studies.runs.recipe_text import case_of_recipe, recipe_text
+from studies.runs.recipes import QuadraticBody
 from studies.scene.library.liver_press import LIVER_PRESS
 
 
@@ -18,7 +19,7 @@ def test_every_case_of_the_catalogue_comes_back(study):
 
 def test_only_what_was_chosen_is_named():
     assert recipe_text(Case(LIVER_PRESS)) == "{}"
-    case = Case(LIVER_PRESS, BodyRecipe("quadratic", 794), dt_fraction=0.8)
+    case = Case(LIVER_PRESS, QuadraticBody(794), dt_fraction=0.8)
     assert recipe_text(case) == '{"body": {"kind": "quadratic", "nodes": 794}, "dt_fraction": 0.8}'
 
 

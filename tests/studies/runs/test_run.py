@@ -10,9 +10,10 @@ from massspring.run.history import EXTRA
 from studies.base.errors import StudyError
 from studies.runs import current
 from studies.runs import run as module
-from studies.runs.case import BodyRecipe, Case
+from studies.runs.case import Case
 from studies.runs.current import case_path
 from studies.runs.prepare import prepare
+from studies.runs.recipes import SurfaceBody, TetrahedralBody
 from studies.runs.run import checkpoint_frames, judge, measure, replay, run_case
 from studies.scene.library.stress import STRESS_SCENES
 from studies.store.record import Field, Status, read_record, write_record
@@ -85,7 +86,7 @@ def test_what_the_guards_did_is_stored():
     counts = {}
     for name in ("shrunk", "line"):
         scene = next(scene for scene in STRESS_SCENES if scene.name == f"stress_{name}")
-        attributes = measure(Case(scene, BodyRecipe(nodes=NODES), dt_fraction=0.2)).attributes
+        attributes = measure(Case(scene, TetrahedralBody(nodes=NODES), dt_fraction=0.2)).attributes
         counts[name] = attributes["capped_steps"], attributes["skipped_steps"]
     steps = attributes["steps"] * attributes["frames"]
     assert counts["shrunk"][0] > 0 and counts["shrunk"][1] == 0
@@ -96,7 +97,7 @@ def test_what_the_guards_did_is_stored():
 
 def test_iterations_of_an_iterative_solve_are_stored(ran):
     assert not read_record(ran[1]).fields["iterations"].values.any()
-    most_and_sum = measure(tiny_case(body=BodyRecipe(nodes=60, volumes="nodal"))).fields["iterations"].values
+    most_and_sum = measure(tiny_case(body=TetrahedralBody(nodes=60, volumes="nodal"))).fields["iterations"].values
     assert (most_and_sum[:, 0] >= most_and_sum[:, 1]).all()
     assert (most_and_sum[:, 1] > 0).all()
 
@@ -222,7 +223,7 @@ def test_only_runs_are_replayed(ran, tmp_path):
 @pytest.mark.parametrize("method", [Element(), Xpbd()], ids=lambda method: method.name)
 def test_a_method_that_does_not_apply_is_skipped_with_its_reason(mesh_cache, method):
     """No failure: a study may hold such cases, and they do not run again."""
-    record = measure(Case(tiny_case().scene, BodyRecipe("surface", nodes=NODES), method))
+    record = measure(Case(tiny_case().scene, SurfaceBody(nodes=NODES), method))
     assert record.status == Status.SKIPPED
     assert f"method '{method.name}' does not apply to the surface body" in record.message
     assert "fill its mesh" in record.message

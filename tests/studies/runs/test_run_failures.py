@@ -9,7 +9,7 @@ import pytest
 from massspring import Capsule, Sphere, Trajectory
 from studies.geometry import HalfSpace
 from studies.meshing.scene_mesh import mesh_for
-from studies.runs.case import BodyRecipe
+from studies.runs.recipes import BODIES, SurfaceBody, TetrahedralBody
 from studies.runs.run import measure, run_case
 from studies.scene.library import Held, Organ
 from studies.store.record import Status, read_record
@@ -58,7 +58,7 @@ def surfaces():
 def test_a_bad_surface_fails_in_one_sentence(tmp_path, fault, kind):
     points, triangles, word = surfaces()[fault]
     scene = file_scene(write_obj(tmp_path / "bad.obj", points, triangles))
-    message = failure(tiny_case(scene=scene, body=BodyRecipe(kind)))
+    message = failure(tiny_case(scene=scene, body=BODIES[kind]()))
     assert message.startswith("bad.obj: ")
     assert word in message
 
@@ -66,7 +66,7 @@ def test_a_bad_surface_fails_in_one_sentence(tmp_path, fault, kind):
 def test_a_good_surface_runs(tmp_path):
     scene = file_scene(write_obj(tmp_path / "good.obj", *box()))
     for kind in ("tetrahedral", "surface"):
-        record = measure(tiny_case(scene=scene, body=BodyRecipe(kind)))
+        record = measure(tiny_case(scene=scene, body=BODIES[kind]()))
         assert record.status == Status.OK
         fall = (record.fields["snapshots"].values[-1] - record.fields["rest"].values)[:, 2]
         # Symplectic Euler falls ½ g t (t + dt), every node alike.
@@ -85,10 +85,10 @@ def test_negative_tetrahedra_fail_in_one_sentence(tmp_path):
 def test_millimetres_read_as_metres_warn_with_the_box(tmp_path):
     points, triangles = box()
     path = write_obj(tmp_path / "organ.obj", 1000 * points, triangles)
-    case = tiny_case(scene=file_scene(path), body=BodyRecipe("surface"))
+    case = tiny_case(scene=file_scene(path), body=SurfaceBody())
     warning = measure(case).attributes["warnings"]
     assert re.search(r"organ\.obj: the bounding box is 100 x 100 x 100 m; .* unit='mm'", warning)
-    right = tiny_case(scene=file_scene(path, unit="mm"), body=BodyRecipe("surface"))
+    right = tiny_case(scene=file_scene(path, unit="mm"), body=SurfaceBody())
     record = measure(right)
     assert (record.status, record.attributes["warnings"]) == (Status.OK, "")
 
@@ -117,10 +117,9 @@ def test_millimetres_read_as_metres_warn_with_the_box(tmp_path):
         ),
         ({"dt": 1.0}, "lies above the stability limit of"),
         ({"dt_fraction": 1.2, "frames": 100}, "set beyond_limit to see the run diverge"),
-        ({"body": BodyRecipe(nodes=NODES, volumes="regions", regions=90)}, "more volumes than nodes lock it"),
-        ({"body": BodyRecipe("surface", NODES, volumes="nodal")}, "the body has none; fill its mesh"),
-        ({"body": BodyRecipe(nodes=0)}, "nodes"),
-        ({"body": BodyRecipe(nodes=NODES, stiffness=0.0)}, "stiffness factor is 0"),
+        ({"body": TetrahedralBody(nodes=NODES, volumes="regions", regions=90)}, "more volumes than nodes lock it"),
+        ({"body": TetrahedralBody(nodes=0)}, "nodes"),
+        ({"body": TetrahedralBody(nodes=NODES, stiffness=0.0)}, "stiffness factor is 0"),
         (
             {"scene": replace(SQUEEZE, obstacles=(replace(SQUEEZE.obstacles[0], point=(0.0, 0.0, 0.0)),))},
             "inside the body",
@@ -136,7 +135,7 @@ def test_attachments_that_overlap_or_miss_fail_in_one_sentence(tmp_path):
     path = write_obj(tmp_path / "box.obj", *box())
     top = Held("top", HalfSpace((0.0, 0.0, 0.04), (0.0, 0.0, -1.0)), Trajectory())
     far = Held("far", HalfSpace((0.0, 0.0, 9.0), (0.0, 0.0, -1.0)))
-    body = BodyRecipe("surface")
+    body = SurfaceBody()
     assert measure(tiny_case(scene=file_scene(path, held=(top,)), body=body)).status == Status.OK
     assert "same node" in failure(tiny_case(scene=file_scene(path, held=(top, replace(top, name="again"))), body=body))
     assert "holds no node" in failure(tiny_case(scene=file_scene(path, held=(far,)), body=body))
@@ -149,7 +148,7 @@ def test_a_mesh_file_comes_as_it_is(tmp_path):
 
 
 def test_failures_are_stored_like_successes(tmp_path):
-    case = tiny_case(body=BodyRecipe(nodes=NODES, stiffness=-1.0))
+    case = tiny_case(body=TetrahedralBody(nodes=NODES, stiffness=-1.0))
     record = read_record(run_case(tmp_path, "tiny", case))
     assert record.status == Status.FAILED
     assert why_stale(tmp_path, case) is None

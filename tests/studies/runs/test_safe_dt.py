@@ -7,8 +7,9 @@ import pytest
 from massspring import METHODS, StepLimit, Xpbd, XpbdNeoHookean
 from studies.base.errors import StudyError
 from studies.runs import safe_dt as module
-from studies.runs.case import BodyRecipe, Case
+from studies.runs.case import Case
 from studies.runs.prepare import prepare
+from studies.runs.recipes import QuadraticBody, TetrahedralBody
 from studies.runs.safe_dt import ABOVE, BELOW, SafeStep, safe_step
 from studies.scene.library.ball_squeeze import BALL_SQUEEZE
 from studies.store.record import Status
@@ -16,12 +17,12 @@ from tests.studies.tiny import tiny_case
 
 UNLIMITED = [method for method in METHODS if not method().capabilities.conditionally_stable]
 SHORT = replace(BALL_SQUEEZE, reference=None, duration=1.0, checkpoints=(1.0,))
-RECIPES = {"points": BodyRecipe("quadratic", 594), "elements": BodyRecipe(nodes=60, law="cotangent", volumes="nodal")}
+RECIPES = {"points": QuadraticBody(594), "elements": TetrahedralBody(nodes=60, law="cotangent", volumes="nodal")}
 
 
 def recipe_for(method):
     """A small body that the method advances."""
-    return RECIPES.get(method.capabilities.keeps, BodyRecipe("tetrahedral", 60))
+    return RECIPES.get(method.capabilities.keeps, TetrahedralBody(60))
 
 
 @pytest.mark.parametrize("method", [m for m in METHODS if m not in UNLIMITED], ids=lambda method: method.name)
@@ -54,7 +55,7 @@ def test_a_method_without_a_limit_says_so(method):
 
 def test_stiffer_means_shorter():
     """Frequencies go with the root of the stiffness: four times stiffer, half the step."""
-    soft, stiff = (safe_step(Case(SHORT, BodyRecipe("tetrahedral", 60, stiffness=k))).limit for k in (1.0, 4.0))
+    soft, stiff = (safe_step(Case(SHORT, TetrahedralBody(60, stiffness=k))).limit for k in (1.0, 4.0))
     assert stiff.undamped == pytest.approx(0.5 * soft.undamped, rel=1e-6)
 
 
@@ -74,14 +75,14 @@ def test_what_counts_as_verified(below, above, verified):
 @pytest.mark.parametrize("wrong", [0.5, 1.5])
 def test_a_wrong_prediction_is_not_verified_and_the_bracket_holds_the_true_limit(monkeypatch, wrong):
     """Mutants that predict half the limit, or one and a half of it: the bracket is where the true one is."""
-    right = prepare(Case(SHORT, BodyRecipe("tetrahedral", 60))).limit
+    right = prepare(Case(SHORT, TetrahedralBody(60))).limit
 
     def mutant(case):
         preparation = prepare(case)
         return replace(preparation, limit=StepLimit(preparation.limit.frequency / wrong, preparation.limit.damping))
 
     monkeypatch.setattr(module, "prepare", mutant)
-    step = safe_step(Case(SHORT, BodyRecipe("tetrahedral", 60)))
+    step = safe_step(Case(SHORT, TetrahedralBody(60)))
     assert not step.verified and ("longer" if wrong < 1 else "shorter") in step.verdict
     below, above = step.bracket
     assert below < right.damped < above
@@ -92,7 +93,7 @@ def test_a_wrong_prediction_is_not_verified_and_the_bracket_holds_the_true_limit
 @pytest.mark.parametrize("volumes", ["whole", "regions", "nodal"])
 def test_constraints_never_shorten_the_limit(volumes):
     """Cauchy interlacing: volumes take modes away. A few leave the stiffest mode as it is, one per node does not."""
-    step = safe_step(Case(SHORT, BodyRecipe("tetrahedral", 60, volumes=volumes, regions=4)))
+    step = safe_step(Case(SHORT, TetrahedralBody(60, volumes=volumes, regions=4)))
     assert step.bracket[1] > step.limit.damped
     assert step.verified == (volumes != "nodal")
     assert ("longer than predicted" in step.verdict) == (not step.verified)
@@ -106,4 +107,4 @@ def test_a_limit_that_no_run_shows_has_no_bracket():
 
 def test_what_cannot_be_prepared_is_one_sentence():
     with pytest.raises(StudyError, match="stiffness factor is -1"):
-        safe_step(tiny_case(body=BodyRecipe(nodes=60, stiffness=-1.0)))
+        safe_step(tiny_case(body=TetrahedralBody(nodes=60, stiffness=-1.0)))

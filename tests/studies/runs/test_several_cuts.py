@@ -23,8 +23,9 @@ from studies.reference.reference_solves import ReferenceSolve
 from studies.reference.solve import solve
 from studies.report.page.case_data import errors_of
 from studies.report.view.from_records import shown_run
-from studies.runs.case import BodyRecipe, Case
+from studies.runs.case import Case
 from studies.runs.prepare import prepare, prepared_on
+from studies.runs.recipes import QuadraticBody, SurfaceBody, TetrahedralBody
 from studies.runs.run import measure
 from studies.scene.checks import check_scene
 from studies.scene.cut import Cut, nearest_cut
@@ -35,10 +36,10 @@ from tests.campaigns import campaign
 
 pytestmark = pytest.mark.slow
 METRIC = {metric.name: metric for metric in METRICS}
-ONE, NODAL = BodyRecipe(nodes=200), BodyRecipe(nodes=200, law="cotangent", volumes="nodal")
+ONE, NODAL = TetrahedralBody(nodes=200), TetrahedralBody(nodes=200, law="cotangent", volumes="nodal")
 COARSE = 120
 """Surface nodes where nothing is compared with the reference."""
-QUADRATIC = BodyRecipe("quadratic", nodes=294, mass="stiffness")
+QUADRATIC = QuadraticBody(nodes=294, mass="stiffness")
 UP = (0.0, 0.0, 1.0)
 BELOW, ABOVE = BALL_CUT_TWICE.cuts
 AT_ONCE = replace(BALL_CUT_TWICE, cuts=(BELOW, replace(ABOVE, at=CUT_AT)), reference=None)
@@ -251,9 +252,9 @@ def test_meshes_of_two_sections_have_three_pieces():
         assert (np.cross(faces[:, 1] - faces[:, 0], faces[:, 2] - faces[:, 0])[:, 2] > 0).all()
     middle = replace(BALL_BISECTED, cuts=cuts)
     with pytest.raises(StudyError, match="cut 'low' or 'high' leaves a piece that nothing holds"):
-        prepare(Case(middle, BodyRecipe(nodes=COARSE), ImplicitVolume()))
+        prepare(Case(middle, TetrahedralBody(nodes=COARSE), ImplicitVolume()))
     freed = replace(middle, cuts=(cuts[0], replace(cuts[1], free=True)))
-    assert len(np.unique(prepare(Case(freed, BodyRecipe(nodes=COARSE), ImplicitVolume())).opening.parts)) == 3
+    assert len(np.unique(prepare(Case(freed, TetrahedralBody(nodes=COARSE), ImplicitVolume())).opening.parts)) == 3
 
 
 def test_cuts_that_no_scene_or_body_can_have_are_refused():
@@ -271,10 +272,10 @@ def test_cuts_that_no_scene_or_body_can_have_are_refused():
     with pytest.raises(StudyError, match="has its last checkpoint at 4 s and its cut at 4 s"):
         check_scene(replace(BALL_CUT_TWICE, duration=5.0, cuts=(BELOW, replace(ABOVE, at=4.0))))
     with pytest.raises(DoesNotApply, match="which has 2 cuts; take cut 'conforming'"):
-        prepare(Case(AT_ONCE, BodyRecipe(nodes=COARSE, cut="virtual"), ImplicitVolume()))
+        prepare(Case(AT_ONCE, TetrahedralBody(nodes=COARSE, cut="virtual"), ImplicitVolume()))
     sections = replace(AT_ONCE, cuts=tuple(replace(cut, within=None, free=True) for cut in AT_ONCE.cuts))
     with pytest.raises(DoesNotApply, match="it has 2 cuts, and this body is cut once"):
-        prepare(Case(sections, BodyRecipe("surface", nodes=COARSE), ImplicitVolume()))
+        prepare(Case(sections, SurfaceBody(nodes=COARSE), ImplicitVolume()))
     with pytest.raises(StudyError, match="it has 2 cuts, and files and words of an export are of one"):
         given_scene(BALL_CUT_TWICE)
     with pytest.raises(StudyError, match="has 2 cuts, and one at most is known here"):

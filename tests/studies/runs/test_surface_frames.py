@@ -11,8 +11,9 @@ from studies.metrics.timing.cases import time_cases
 from studies.report.kept_volume import kept_volumes
 from studies.report.view.stored import stored_runs
 from studies.runs import surface_frames
-from studies.runs.case import BodyRecipe, Case, case_from_json
+from studies.runs.case import Case, case_from_json
 from studies.runs.prepare import prepare
+from studies.runs.recipes import TetrahedralBody
 from studies.runs.run import checkpoint_frames, measure, replay, run_case
 from studies.runs.surface_frames import MOMENTS, moments
 from studies.scene.library import BLADDER_FILL
@@ -93,14 +94,14 @@ def test_an_early_end_is_the_last_frame_and_a_start_of_its_own_the_first():
     frames, surface = cut.fields["surface_frame"].values, cut.fields["surface"].values
     assert frames[-1] == cut.attributes["good_frames"] < FRAMES and np.isfinite(surface).all()
     shrunk = next(scene for scene in STRESS_SCENES if scene.name == "stress_shrunk")
-    record = measure(Case(shrunk, BodyRecipe(nodes=NODES), dt_fraction=0.2, frames=4, recorded=("surface",)))
+    record = measure(Case(shrunk, TetrahedralBody(nodes=NODES), dt_fraction=0.2, frames=4, recorded=("surface",)))
     first = record.fields["surface"].values[0]
     assert np.ptp(first, axis=0).max() < 0.01 * np.ptp(record.fields["rest"].values, axis=0).max()
 
 
 def test_a_lumen_is_not_seen():
     scene = replace(BLADDER_FILL, reference=None)
-    record = measure(Case(scene, BodyRecipe(nodes=400), frames=1, dt_fraction=0.5, recorded=("surface",)))
+    record = measure(Case(scene, TetrahedralBody(nodes=400), frames=1, dt_fraction=0.5, recorded=("surface",)))
     nodes, triangles = record.fields["surface_node"].values, record.fields["triangles"].values
     assert len(nodes) < len(np.unique(triangles))
     inside = np.isin(triangles, nodes).all(axis=1)

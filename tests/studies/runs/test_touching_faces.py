@@ -16,8 +16,9 @@ from studies.reference.nested import problem_of
 from studies.reference.problem import problem_on
 from studies.reference.reference_solves import ReferenceSolve
 from studies.reference.solve import solve
-from studies.runs.case import BodyRecipe, Case
+from studies.runs.case import Case
 from studies.runs.prepare import prepare
+from studies.runs.recipes import QuadraticBody, TetrahedralBody
 from studies.runs.run import measure
 from studies.scene.as_json import scene_from_dict, scene_to_dict
 from studies.scene.library.ball_cut_pressed import BALL_CUT_PRESSED, PUSH, RADIUS
@@ -36,9 +37,9 @@ STRAIGHT = replace(
 )
 """Without the slide of the cap the cut lies in a plane of symmetry."""
 BODIES = {
-    "one": BodyRecipe(nodes=350),
-    "cotangent": BodyRecipe(nodes=200, law="cotangent", volumes="nodal"),
-    "quadratic": BodyRecipe("quadratic", nodes=600),
+    "one": TetrahedralBody(nodes=350),
+    "cotangent": TetrahedralBody(nodes=200, law="cotangent", volumes="nodal"),
+    "quadratic": QuadraticBody(nodes=600),
 }
 
 

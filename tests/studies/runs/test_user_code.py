@@ -8,6 +8,7 @@ from studies.report.page.part import read_part
 from studies.report.results import refresh
 from studies.runs import user_code
 from studies.runs.current import case_path
+from studies.runs.recipes import TetrahedralBody
 from studies.runs.run import measure
 from studies.runs.user_code import files_of, given_files, load_given
 from studies.store.ledger import Ledger
@@ -120,7 +121,7 @@ def test_lines_of_the_page_name_the_file(mine, ran):
     for case, name in zip(part["cases"].values(), (case.name for case in study.cases), strict=True):
         assert case["run"] == f"organbench run {mine.name} --case {name}"
     assert [case["again"].endswith(f".h5 --file {mine.name}") for case in part["cases"].values()] == [
-        bool(files_of(case.method, case.body.law)) for case in study.cases
+        bool(files_of(case)) for case in study.cases
     ]
     assert any(" --file " in case["again"] for case in part["cases"].values())
 
@@ -212,5 +213,6 @@ def test_compiled_code_is_kept_by_the_state_of_the_kernels(mine, monkeypatch):
 
 def test_a_method_and_a_law_name_their_file_each_alone_and_ours_none(mine):
     calm, ours = find_study(str(mine)).cases[1].method, tiny_case().method
-    named = [user_code.files_of(method, law) for method in (calm, ours) for law in ("bars", "van_gelder")]
+    bodies = [TetrahedralBody(law=law) for law in ("bars", "van_gelder")]
+    named = [files_of(tiny_case(body=body, method=method)) for method in (calm, ours) for body in bodies]
     assert [[file.path for file in files] for files in named] == [[mine], [mine], [mine], []]

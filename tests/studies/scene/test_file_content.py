@@ -8,8 +8,9 @@ from studies.catalog import Study
 from studies.meshing.scene_mesh import mesh_for
 from studies.metrics.run import Run
 from studies.reference.reference_solves import ReferenceSolve
-from studies.runs.case import BodyRecipe, Case, case_from_json
+from studies.runs.case import Case, case_from_json
 from studies.runs.current import case_path
+from studies.runs.recipes import TetrahedralBody
 from studies.scene.scene import Organ, ReferencePlan
 from studies.store.entry import MISSING
 from studies.store.paths import key_digest
@@ -18,7 +19,7 @@ from tests.studies.tiny import Silent, cube, file_scene, why_stale, write_obj
 
 
 def case_of(path):
-    return Case(file_scene(path), BodyRecipe(), ImplicitVolume(), frames=2)
+    return Case(file_scene(path), TetrahedralBody(), ImplicitVolume(), frames=2)
 
 
 def written(path, edge=0.1):

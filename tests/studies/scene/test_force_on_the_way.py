@@ -11,7 +11,8 @@ import pytest
 from massspring import Trajectory
 from studies.reference.reference_solves import ReferenceSolve
 from studies.reference.solve import solve
-from studies.runs.case import BodyRecipe, Case
+from studies.runs.case import Case
+from studies.runs.recipes import QuadraticBody
 from studies.runs.run import measure
 from studies.scene.library import LIVER_PRESS, LIVER_PROBE, STOMACH_PRESS, STOMACH_PROBE, Scene
 from studies.scene.scene import FEWEST_UNKNOWNS
@@ -58,7 +59,7 @@ def slower(scene: Scene, times: int) -> Scene:
 def run(scene: Scene, damping: float, times: int = 1) -> tuple[np.ndarray, Record]:
     """The force at the checkpoints [N], and the record."""
     scene = replace(slower(scene, times), damping=damping)
-    body = BodyRecipe("quadratic", SIZE, graded=graded(scene), mass="stiffness")
+    body = QuadraticBody(SIZE, graded=graded(scene), mass="stiffness")
     record = measure(Case(scene, body, dt_fraction=0.8))
     force = scene.output_force(*(record.fields[name].values for name in ("contact_force", "held_force")))
     t = record.fields["t"].values

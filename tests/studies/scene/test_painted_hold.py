@@ -10,7 +10,8 @@ from reference_fem import nodes
 from studies.geometry import painted
 from studies.meshing.reference_mesh import reference_mesh
 from studies.meshing.scene_mesh import mesh_for, patch_nodes
-from studies.runs.case import BodyRecipe, Case, case_from_json
+from studies.runs.case import Case, case_from_json
+from studies.runs.recipes import TetrahedralBody
 from studies.scene.library.ball_clamped import BALL_CLAMPED, CAP, RADIUS
 from studies.scene.scene import Held, Organ
 from tests.studies.geometry.boxes import box, split
@@ -55,7 +56,7 @@ def test_both_solvers_hold_what_is_painted(scene):
 
 
 def test_the_scene_is_kept_whole_in_its_key(scene):
-    case = Case(scene, BodyRecipe(nodes=LEVEL), ImplicitVolume())
+    case = Case(scene, TetrahedralBody(nodes=LEVEL), ImplicitVolume())
     assert case_from_json(case.key) == case
     assert len(case.key) < 100_000
 

@@ -5,8 +5,9 @@ import pytest
 from massspring import sources
 from massspring.sources import own_modules, source_fingerprint
 from studies.reference.reference_solves import reference_fingerprint
-from studies.runs.case import BodyRecipe, Case
+from studies.runs.case import Case
 from studies.runs.current import case_fingerprint, run_fingerprint
+from studies.runs.recipes import QuadraticBody
 from studies.scene.library import LIVER_PROBE
 
 BOTH = {
@@ -64,6 +65,6 @@ def test_springs_make_no_reference_stale_and_elements_no_run(monkeypatch):
 
 def test_the_reference_makes_adaptive_bodies_stale_and_no_others(monkeypatch):
     for graded, stale in ((False, False), (True, False), ("adaptive", True)):
-        case = Case(LIVER_PROBE, BodyRecipe("quadratic", 794, graded=graded))
+        case = Case(LIVER_PROBE, QuadraticBody(794, graded=graded))
         edited = with_edit(monkeypatch, "reference_fem.estimate", lambda case=case: case_fingerprint(case))
         assert (edited != case_fingerprint(case)) == stale

@@ -10,8 +10,9 @@ import pytest
 
 from studies.reference.published import fingerprint_of, published, record_of
 from studies.reference.reference_solves import ReferenceSolve, reference_solves
-from studies.runs.case import BodyRecipe, Case
+from studies.runs.case import Case
 from studies.runs.current import case_path
+from studies.runs.recipes import recipe_from_dict
 from studies.runs.user_code import methods_by_name
 from studies.scene.library import JUDGED, SCENES, Organ
 from studies.store.ledger import Ledger
@@ -58,9 +59,9 @@ def published_runs():
     for row in rows_of(PUBLISHED / "accuracy" / "accuracy.csv"):
         if row["scene"] not in scenes or not row["step_time [µs]"] or " " in row["method"]:
             continue
-        body = {k: tuple(v) if isinstance(v, list) else v for k, v in json.loads(row["recipe"]).get("body", {}).items()}
+        body = recipe_from_dict({"kind": "tetrahedral"} | json.loads(row["recipe"]).get("body", {}))
         method = methods_by_name()[row["method"]]()
-        case = Case(scenes[row["scene"]], BodyRecipe(**body), method, dt_fraction=float(row["dt/dt_c"]))
+        case = Case(scenes[row["scene"]], body, method, dt_fraction=float(row["dt/dt_c"]))
         yield case, float(row["step_time [µs]"]) * 1e-3 * case.scene.duration / float(row["dt [ms]"])
 
 

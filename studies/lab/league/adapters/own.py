@@ -9,7 +9,7 @@ import numpy as np
 from scene_folder import SceneFolder, hand_in
 
 from massspring import METHODS, simulate
-from studies import SCENES, BodyRecipe, Case
+from studies import SCENES, Case, QuadraticBody, TetrahedralBody
 from studies.runs.prepare import prepare
 
 
@@ -24,16 +24,17 @@ def run(
 ) -> None:
     """Runs the scene by a method with its settings and hands it in.
 
-    mass: of a quadratic body (studies.BodyRecipe). dt: length of steps and frames [s]; default: the usual share of the
+    mass: of a quadratic body (studies.QuadraticBody). dt: length of steps and frames [s]; default: the usual share of the
     stability limit.
     """
     own_scene = {one.name: one for one in SCENES}[scene.data["name"]]
     own_scene = replace(own_scene, checkpoints=tuple(float(t) for t in scene.times[1:]))
     kind = {one.name: one for one in METHODS}[method](**settings)
-    body = "quadratic" if scene.mesh == "curved" else "tetrahedral"
-    recipe = BodyRecipe(body, int(scene.data["meshes"][scene.mesh]["outer_nodes"]), mass=mass)
+    body = QuadraticBody if scene.mesh == "curved" else TetrahedralBody
+    chosen = {} if mass == "lumped" else {"mass": mass}
     if kind.capabilities.keeps == "elements":
-        recipe = replace(recipe, law="cotangent", volumes="nodal")  # springs without length, one volume per node
+        chosen |= {"law": "cotangent", "volumes": "nodal"}  # springs without length, one volume per node
+    recipe = body(int(scene.data["meshes"][scene.mesh]["outer_nodes"]), **chosen)
     case = Case(own_scene, recipe, kind)
     if dt is not None:
         case = replace(case, dt=dt, frames=round(own_scene.duration / dt))

@@ -11,11 +11,12 @@ from studies.base.errors import StudyError
 from studies.catalog.population import placed_organs, study_on
 from studies.catalog.study import Study
 from studies.geometry import organ
-from studies.runs.case import BodyRecipe, Case
+from studies.runs.case import Case
+from studies.runs.recipes import TetrahedralBody
 from studies.scene.library import KIDNEY_PROBE, STOMACH_PROBE
 from studies.sweep.find_study import find_study
 
-ONE = Study("base", "?", (Case(KIDNEY_PROBE, BodyRecipe(nodes=150), ImplicitVolume()),), (), ("force_end",))
+ONE = Study("base", "?", (Case(KIDNEY_PROBE, TetrahedralBody(nodes=150), ImplicitVolume()),), (), ("force_end",))
 
 
 @pytest.fixture(scope="module")

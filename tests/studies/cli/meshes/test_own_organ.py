@@ -12,7 +12,7 @@ import pytest
 
 from studies.geometry import organ, read_mesh
 from studies.meshing.scene_mesh import mesh_for
-from studies.runs.case import BodyRecipe
+from studies.runs.recipes import TetrahedralBody
 from studies.scene.chosen_place import DEPTH
 from studies.scene.scene import ReferencePlan
 from studies.scene.scene_file import file_in_python
@@ -141,7 +141,7 @@ def test_a_scene_file_holds_the_tissue_the_hold_and_the_advised_body(organbench,
     assert parameters["holes"] is True and parameters["smooth"] == 1e-3 and parameters["unit"] == "mm"
     answer = advise(one.scene, results=shipped(), timing=False)
     assert (two.body, two.dt_fraction) == (answer.chosen.case.body, answer.chosen.case.dt_fraction)
-    assert one.body == BodyRecipe(nodes=200) and [case.recorded for case in study.cases] == [("surface",)] * 2
+    assert one.body == TetrahedralBody(nodes=200) and [case.recorded for case in study.cases] == [("surface",)] * 2
     # What the estimate rests on.
     assert one.scene.reference == ReferencePlan()
 

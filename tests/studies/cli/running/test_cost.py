@@ -12,13 +12,13 @@ from studies.cli.commands import profile
 from studies.cli.commands.profile import COST, SHARE, SPREAD, WHOLE
 from studies.metrics.timing.skips import SKIPS
 from studies.metrics.timing.stage_cost import ENERGIES, FRAME, ROWS, SKIPPED, STAGE, cost_table, run_frames
-from studies.runs.case import BodyRecipe
 from studies.runs.prepare import prepare
+from studies.runs.recipes import SurfaceBody, TetrahedralBody
 from studies.scene.library.ball_clamped import BALL_CLAMPED
 from studies.scene.library.stomach_slide import STOMACH_SLIDE
 from tests.studies.tiny import tiny_case
 
-HELD = BodyRecipe(nodes=100)
+HELD = TetrahedralBody(nodes=100)
 """Fewer do not keep the area where the ball is held."""
 NO_CONTACT = "contact of nodes: no plane, sphere or capsule"
 
@@ -77,7 +77,7 @@ def test_leaving_a_stage_out_changes_no_answer(skip, method):
     if skip.name.startswith("contact"):
         case = case.replaced(scene=BALL_CLAMPED, body=HELD)
     if skip.name.startswith("pairs"):
-        case = case.replaced(scene=STOMACH_SLIDE, body=BodyRecipe("surface", 300))
+        case = case.replaced(scene=STOMACH_SLIDE, body=SurfaceBody(300))
     setup = prepare(case).setup
     assert skip.left_out(setup)
     without = run_frames(setup, setup.start())[2]
@@ -91,7 +91,7 @@ def test_leaving_a_stage_out_changes_no_answer(skip, method):
 @pytest.mark.campaign
 def test_the_table_counts_the_pairs_that_sleep(mesh_cache):
     """Of the thin probe on the stomach nearly all pairs sleep, and the line says what was still compared."""
-    table = cost_table(tiny_case(scene=STOMACH_SLIDE, body=BodyRecipe("surface", 300)), repeats=1)
+    table = cost_table(tiny_case(scene=STOMACH_SLIDE, body=SurfaceBody(300)), repeats=1)
     assert "thin probe: none" not in set(table["what"])
     (line,) = (text for text in table["how much"] if text)
     pairs, boxes = re.search(r"of ([0-9,]+) pairs a step ([0-9.e+]+) boxes compared", line).groups()

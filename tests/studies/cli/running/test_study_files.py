@@ -41,7 +41,10 @@ BROKEN = {
 }
 
 
-OWN = "from studies.catalog import Chart\nfrom massspring import Free\nfrom tests.studies.tiny import *\n"
+OWN = (
+    "from studies import Chart, QuadraticBody, SurfaceBody\nfrom massspring import Free\n"
+    "from tests.studies.tiny import *\n"
+)
 CUTTING = OWN + "from studies.scene.library import BALL_INCISED\nunnamed = replace(BALL_INCISED.cut, name='')\n"
 
 
@@ -58,19 +61,19 @@ BROKEN |= {
     ),
     "no scene": (OWN + "STUDY = tiny_study(cases=(tiny_case(scene=None),))\n", "a case needs a Scene, not None"),
     "nan": (
-        OWN + "STUDY = tiny_study(cases=(tiny_case(body=BodyRecipe(stiffness=float('nan'))),))\n",
+        OWN + "STUDY = tiny_study(cases=(tiny_case(body=TetrahedralBody(stiffness=float('nan'))),))\n",
         "body.stiffness is nan; give a finite number",
     ),
     "text for a number": (
-        OWN + "STUDY = tiny_study(cases=(tiny_case(body=BodyRecipe(nodes='100')),))\n",
+        OWN + "STUDY = tiny_study(cases=(tiny_case(body=TetrahedralBody(nodes='100')),))\n",
         "body.nodes = '100' cannot be stored and read back",
     ),
     "half a node": (
-        OWN + "STUDY = tiny_study(cases=(tiny_case(body=BodyRecipe(nodes=100.5)),))\n",
+        OWN + "STUDY = tiny_study(cases=(tiny_case(body=TetrahedralBody(nodes=100.5)),))\n",
         "'tiny_squeeze', case tiny_squeeze-tetrahedral-100.5-implicit_volume-dt0.5: nodes = '100.5': Input should be a",
     ),
     "whole weight": (
-        OWN + "STUDY = tiny_study(cases=(tiny_case(body=BodyRecipe('surface', weights=(1, 0.5, 1.0, 1.0))),))\n",
+        OWN + "STUDY = tiny_study(cases=(tiny_case(body=SurfaceBody(weights=(1, 0.5, 1.0, 1.0))),))\n",
         "mine.py: scene 'tiny_squeeze', case tiny_squeeze-surface-550-implicit_volume-dt0.5-w1_0.5_1_1: "
         "body.weights[0] is the whole number 1; write 1.0",
     ),
@@ -99,15 +102,15 @@ BROKEN |= {
         "has a name with characters that cannot be printed",
     ),
     "no nodes": (
-        OWN + "STUDY = tiny_study(cases=(tiny_case(body=BodyRecipe(nodes=-5)),))\n",
+        OWN + "STUDY = tiny_study(cases=(tiny_case(body=TetrahedralBody(nodes=-5)),))\n",
         "body.nodes is -5; give a",
     ),
     "graded how": (
-        OWN + "STUDY = tiny_study(cases=(tiny_case(body=BodyRecipe('quadratic', 60, graded='adaptiv')),))\n",
+        OWN + "STUDY = tiny_study(cases=(tiny_case(body=QuadraticBody(60, graded='adaptiv')),))\n",
         "body.graded is 'adaptiv'; give False, True or 'adaptive'",
     ),
     "virtual nodes and no cut": (
-        OWN + "STUDY = tiny_study(cases=(tiny_case(body=BodyRecipe(nodes=60, cut='virtual')),))\n",
+        OWN + "STUDY = tiny_study(cases=(tiny_case(body=TetrahedralBody(nodes=60, cut='virtual')),))\n",
         "body.cut is 'virtual', and the scene has no cut; leave it out",
     ),
     "a list of cuts": (
@@ -152,7 +155,7 @@ def test_a_chart_that_fails_is_a_sentence_after_all_else_is_done(refused, result
 def test_a_dry_run_with_a_missing_mesh_file_is_refused(refused, tmp_path):
     file = tmp_path / "mine.py"
     file.write_text(
-        "from tests.studies.tiny import *\n"
-        "STUDY = tiny_study(cases=(tiny_case(scene=file_scene('none.stl'), body=BodyRecipe('surface')),))\n"
+        "from studies import SurfaceBody\nfrom tests.studies.tiny import *\n"
+        "STUDY = tiny_study(cases=(tiny_case(scene=file_scene('none.stl'), body=SurfaceBody()),))\n"
     )
     assert "there is no mesh file none.stl" in refused("run", file, "--dry-run", "--results", tmp_path / "results")

@@ -10,7 +10,8 @@ from massspring import ImplicitVolume, Method
 from reference_fem import nodes
 from studies.reference.reference_solves import ReferenceSolve
 from studies.reference.sample import Sample, SamplePoints, sample_fields
-from studies.runs.case import BodyRecipe, Case
+from studies.runs.case import Case
+from studies.runs.recipes import TetrahedralBody
 from studies.scene.scene import Scene
 from studies.store.new_record import new_fields, new_record
 from studies.store.paths import record_path
@@ -21,7 +22,7 @@ from tests.studies.made_up_run import CELLS, POINTS, SCENE, bend, run
 
 def stored_case(root: Path, study="made", scene: Scene = SCENE, method: Method | None = None, **changes) -> Path:
     """The file of a run in a scene, as made_up_run.run makes it with `changes`."""
-    case = Case(scene, BodyRecipe(nodes=150), method or ImplicitVolume())
+    case = Case(scene, TetrahedralBody(nodes=150), method or ImplicitVolume())
     path = record_path(root, study, case.name, case.key)
     write_record(path, replace(run(scene=scene, **changes).record, key=case.key, name=case.name))
     return path

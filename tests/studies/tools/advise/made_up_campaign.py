@@ -5,17 +5,18 @@ from pathlib import Path
 
 import pandas as pd
 
-from studies.runs.case import BodyRecipe, Case
+from studies.runs.case import Case
 from studies.runs.recipe_text import recipe_text
+from studies.runs.recipes import BodyRecipe, QuadraticBody, SurfaceBody, TetrahedralBody
 from studies.scene.scene import Scene
 from studies.store.machine import machine_id
 from studies.store.tables import write_table
 
-PAPER = BodyRecipe("surface", 550)
-ONE = BodyRecipe(nodes=300)
-EVEN = BodyRecipe("quadratic", 594, mass="stiffness")
-GRADED = BodyRecipe("quadratic", 994, graded="adaptive", mass="stiffness")
-FINE = BodyRecipe("quadratic", 1194, graded="adaptive", mass="stiffness")
+PAPER = SurfaceBody(550)
+ONE = TetrahedralBody(nodes=300)
+EVEN = QuadraticBody(594, mass="stiffness")
+GRADED = QuadraticBody(994, graded="adaptive", mass="stiffness")
+FINE = QuadraticBody(1194, graded="adaptive", mass="stiffness")
 LADDER = {
     PAPER: (-70.0, 17.0, 0.01),
     ONE: (-31.0, 5.0, 0.02),

@@ -10,7 +10,7 @@ from studies.base.errors import StudyError
 from studies.meshing.true_surface import ShapeErrors
 from studies.metrics.table import study_table
 from studies.metrics.wish import usual_wish
-from studies.runs.case import BodyRecipe, neighbours
+from studies.runs.recipes import BodyRecipe, neighbours
 from studies.scene.library import (
     BALL_CLAMPED,
     BLADDER_FILL,

@@ -10,12 +10,13 @@ from massspring import ImplicitVolume
 from studies.base.errors import StudyError
 from studies.catalog.population import Population, member
 from studies.catalog.population.draw import organ_of
-from studies.runs.case import BodyRecipe, Case
+from studies.runs.case import Case
 from studies.runs.recipe_text import recipe_text
+from studies.runs.recipes import QuadraticBody
 from studies.scene.library import KIDNEY_PROBE, LIVER_PROBE
 from studies.tools.advise.population import unseen, words
 
-CASE = Case(LIVER_PROBE, BodyRecipe("quadratic", 794, graded=True), ImplicitVolume(), dt_fraction=0.8)
+CASE = Case(LIVER_PROBE, QuadraticBody(794, graded=True), ImplicitVolume(), dt_fraction=0.8)
 FORCES = np.linspace(-4.0, 4.0, 41)
 
 

@@ -60,7 +60,7 @@ def test_a_trial_is_made_gentler_choice_by_choice():
         ({"body": "surface", "advance": 0.5}, "the surface body does not apply"),
         ({"body": "surface", "blade": "half space"}, "the surface body does not apply"),
         ({"way": "virtual", "advance": 0.5}, "whose cut advances"),
-        ({"way": "virtual", "body": "quadratic"}, "is not cut by virtual nodes"),
+        ({"way": "virtual", "body": "quadratic"}, "has no setting 'cut'"),
         ({"way": "virtual", "contact": True}, "whose faces of the cut touch"),
         ({"opens": True}, "its organ is solid"),
     ],
