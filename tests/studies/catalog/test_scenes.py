@@ -11,6 +11,7 @@ from massspring import METHODS, simulate
 from studies.base.errors import StudyError
 from studies.runs.case import Case
 from studies.runs.prepare import prepare
+from studies.runs.recipes import BODIES
 from studies.runs.run import checkpoint_frames
 from studies.scene.as_json import scene_from_dict, scene_to_json
 from studies.scene.kind import has_wall
@@ -20,7 +21,7 @@ from tests.studies.tiny import bodies_of
 
 SMALL, THIN = 150, 400
 """Surface nodes of a small solid organ, and of a small hollow one: its wall folds on coarser meshes."""
-BODIES = pytest.mark.parametrize(("scene", "kind"), bodies_of(SCENES))
+KINDS = pytest.mark.parametrize(("scene", "kind"), bodies_of(SCENES))
 
 
 @pytest.fixture(params=SCENES, ids=lambda scene: scene.name)
@@ -116,7 +117,7 @@ def test_a_skipped_method_is_refused_with_the_reason(scene):
     assert METHODS[0].name == "free"
 
 
-@BODIES
+@KINDS
 def test_body_weighs_what_the_tissue_weighs(scene, kind):
     prepared = small_setup(scene, kind)
     body = prepared.setup.body
@@ -125,14 +126,14 @@ def test_body_weighs_what_the_tissue_weighs(scene, kind):
     assert body.volume == pytest.approx(prepared.mesh.volume, rel=1e-12)
 
 
-@BODIES
+@KINDS
 def test_obstacles_start_outside(scene, kind):
     body = small_setup(scene, kind).setup.body
     for obstacle in scene.obstacles:
         assert obstacle.gap(body.rest, 0.0).min() >= -1e-9 * body.size
 
 
-@BODIES
+@KINDS
 def test_something_is_felt(scene, kind):
     """Every obstacle reaches the body, and the probed force is a press at the deepest point, or a lumen swells."""
     case = small(scene, kind)
