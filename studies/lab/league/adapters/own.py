@@ -24,8 +24,8 @@ def run(
 ) -> None:
     """Runs the scene by a method with its settings and hands it in.
 
-    mass: of a quadratic body (studies.QuadraticBody). dt: length of steps and frames [s]; default: the usual share of the
-    stability limit.
+    mass: as in studies.QuadraticBody. dt: length of steps and frames [s]; default: the usual share of the stability
+    limit.
     """
     own_scene = {one.name: one for one in SCENES}[scene.data["name"]]
     own_scene = replace(own_scene, checkpoints=tuple(float(t) for t in scene.times[1:]))
