@@ -122,7 +122,7 @@ def refresh(ledger: Ledger, study: Study, references: References | None = None) 
     """
     folder, state = study_folder(ledger.root, study.name), state_of_study(ledger, study)
     paths = [*(folder / chart.file for chart in study.charts), folder / f"{study.name}.csv"]
-    paths += [ledger.root / summary.file for summary in SUMMARIES if summary.study == study.name]
+    paths += [ledger.root / file for file in SUMMARIES.get(study.name, ())]
     before = _stamped(ledger.root / "cache" / f"{study.name}.drawn.json")
     current = before.get("inputs") == state and all(path.exists() for path in paths)
     if current and read_part(ledger.root, study) is not None:
@@ -158,8 +158,8 @@ def draw(loaded: Loaded, state: str) -> list[str]:
     root, study, runs = loaded.root, loaded.study, [*loaded.runs, *loaded.submissions]
     rows = study_table(runs, study.columns)
     write_table(study_folder(root, study.name) / f"{study.name}.csv", rows)
-    for summary in (summary for summary in SUMMARIES if summary.study == study.name):
-        write_whole(root / summary.file, (summary.text(loaded.runs) + "\n").encode())
+    for file, text in SUMMARIES.get(study.name, {}).items():
+        write_whole(root / file, (text(loaded.runs) + "\n").encode())
     with svg_copies() as pictures:
         draw_charts(root, study, runs)
     write_part(root, study, runs, rows, pictures)
