@@ -46,7 +46,7 @@ PROGRAM = """
 import sys
 import studies
 from studies.__main__ import main
-from studies.report.archive.crate import citation_file
+from studies.report.archive.packing import citation_file
 print(studies.__file__)
 print(citation_file())
 from studies.tools.advise.answer import advise

@@ -9,7 +9,7 @@ import typer
 from studies.catalog import STUDIES
 from studies.cli.terminal import Results, busy, say, warn
 from studies.report.archive.checking import check
-from studies.report.archive.packing import chosen, others, pack
+from studies.report.archive.packing import pack, stored_studies
 from studies.sweep.find_study import find_studies
 
 
@@ -30,11 +30,11 @@ def archive(
             count = check(checked)
         say(f"{checked}: {count} files, each as it was packed")
         return
-    chosen_studies = find_studies(studies) if studies else chosen(results, STUDIES)
+    chosen, others = (find_studies(studies), []) if studies else stored_studies(results, STUDIES)
     files = [Path(name) for name in studies or [] if name.endswith(".py")]
-    with busy(f"packing {', '.join(study.name for study in chosen_studies)}"):
-        packed = pack(results, chosen_studies, output, datetime.now(UTC).date().isoformat(), files)
-    warn(packed.remarks)
-    if not studies and (left := others(results, STUDIES)):
-        warn([f"not packed: {', '.join(left)}, of files; name them, as in `organbench archive FILE.py`"])
-    say(f"{packed.path}: {packed.files} files, {packed.size / 1e6:.1f} MB")
+    with busy(f"packing {', '.join(study.name for study in chosen)}"):
+        count, remarks = pack(results, chosen, output, datetime.now(UTC).date().isoformat(), files)
+    warn(remarks)
+    if others:
+        warn([f"not packed: {', '.join(others)}, of files; name them, as in `organbench archive FILE.py`"])
+    say(f"{output}: {count} files, {output.stat().st_size / 1e6:.1f} MB")

@@ -4,8 +4,7 @@ import hashlib
 import os
 import zipfile
 import zlib
-from collections.abc import Callable, Iterable
-from functools import partial
+from collections.abc import Callable
 from pathlib import Path, PurePosixPath
 from typing import IO
 
@@ -17,7 +16,7 @@ LARGEST = 50_000_000
 """Bytes of a manifest: half a million files."""
 ENCRYPTED = 1
 """Of the flags of a file in a zip."""
-Opener = Callable[[str], IO[bytes]]
+BROKEN = (zipfile.BadZipFile, zlib.error, EOFError)
 
 
 def check(path: Path) -> int:
@@ -29,13 +28,15 @@ def check(path: Path) -> int:
     has changed, or has a path outside the archive.
     """
     if path.is_dir():
-        return _compare(path, partial(_of_folder, path))
+        return _compare(path, lambda name: _of_folder(path, name))
     if not path.is_file():
         raise StudyError(f"there is no archive {path}; give the zip file, or the folder that it was unpacked to")
     try:
         with zipfile.ZipFile(path) as archive:
-            return _compare(path, partial(_of_zip, path, archive))
-    except (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError) as problem:
+            if any(entry.flag_bits & ENCRYPTED for entry in archive.infolist()):
+                raise StudyError(f"{path} is encrypted: unpack it with its password, and check the folder")
+            return _compare(path, archive.open)
+    except (*BROKEN, NotImplementedError) as problem:
         raise DamagedFile(f"{path} is cut off or damaged ({problem}): {AGAIN}") from problem
 
 
@@ -49,53 +50,41 @@ def _of_folder(folder: Path, name: str) -> IO[bytes]:
     return open(file, "rb")
 
 
-def _of_zip(path: Path, archive: zipfile.ZipFile, name: str) -> IO[bytes]:
-    if archive.getinfo(name).flag_bits & ENCRYPTED:
-        raise StudyError(f"{path} is encrypted: unpack it with its password, and check the folder")
-    return archive.open(name)
-
-
-def _compare(path: Path, opened: Opener) -> int:
-    count = 0
-    for name, expected in _entries(path, opened):
+def _compare(path: Path, opened: Callable[[str], IO[bytes]]) -> int:
+    expected = _manifest(path, opened)
+    for name, checksum in expected.items():
         try:
             with opened(name) as file:
-                checksum = hashlib.file_digest(file, "sha256").hexdigest()  # pyright: ignore[reportArgumentType]
+                found = hashlib.file_digest(file, "sha256").hexdigest()  # pyright: ignore[reportArgumentType]
         except (KeyError, FileNotFoundError) as problem:
             raise DamagedFile(f"{path} lacks {name}: {AGAIN}") from problem
-        except (zipfile.BadZipFile, zlib.error, EOFError, OSError) as problem:
+        except (*BROKEN, OSError) as problem:
             raise DamagedFile(f"{path}: {name} cannot be read ({problem}): {AGAIN}") from problem
-        if checksum != expected:
+        if found != checksum:
             raise DamagedFile(f"{path}: {name} has changed since it was packed: {AGAIN}")
-        count += 1
-    return count
+    return len(expected)
 
 
-def _entries(path: Path, opened: Opener) -> Iterable[tuple[str, str]]:
-    """(name, SHA-256) of every file that was packed."""
+def _manifest(path: Path, opened: Callable[[str], IO[bytes]]) -> dict[str, str]:
+    """Name -> SHA-256 of every file that was packed."""
     try:
         with opened(MANIFEST) as file:
-            content = file.read(LARGEST + 1)
+            content = file.read(LARGEST + 1)  # a zip of 50 MB of line ends is 50 kB
     except (KeyError, FileNotFoundError) as problem:
         raise StudyError(f"{path} is not an archive of organbench: it has no {MANIFEST}") from problem
     except OSError as problem:
         raise StudyError(f"{path / MANIFEST} cannot be read ({problem.strerror}): change its permissions") from problem
     if len(content) > LARGEST:
         raise DamagedFile(f"{path}: {MANIFEST} has more than {LARGEST / 1e6:.0f} MB: {AGAIN}")
-    names = set[str]()
+    expected = dict[str, str]()
     for line in content.decode("utf-8", errors="replace").splitlines():
-        expected, separator, name = line.partition("  ")
-        if not separator or len(expected) != 64 or name in names:
+        checksum, separator, name = line.partition("  ")
+        if not separator or len(checksum) != 64 or name in expected:
             raise DamagedFile(f"{path}: {MANIFEST} has changed since it was packed: {AGAIN}")
-        if not _inside(name):
+        place = PurePosixPath(name)
+        if place.is_absolute() or ".." in place.parts or place.as_posix() != name or name == ".":
             raise DamagedFile(
                 f"{path}: {MANIFEST} names {name!r}, which lies outside: it is not an archive of organbench"
             )
-        names.add(name)
-        yield name, expected
-
-
-def _inside(name: str) -> bool:
-    """Whether a name leads to a place below the folder, and is the only name of that place."""
-    place = PurePosixPath(name)
-    return not place.is_absolute() and ".." not in place.parts and place.as_posix() == name and name != "."
+        expected[name] = checksum
+    return expected

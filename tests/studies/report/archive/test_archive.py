@@ -1,4 +1,5 @@
-"""An archive holds all that its charts need, describes each file, and draws the charts again."""
+"""An archive holds all that its charts need, describes each file, and draws the charts again; what is damaged, stale or
+no archive is named in a sentence."""
 
 import hashlib
 import json
@@ -15,32 +16,58 @@ import pandas as pd
 import pytest
 
 from studies.base.errors import StudyError
+from studies.catalog import Chart
 from studies.cli.commands import archive as archive_command
 from studies.exchange.entry import ENTRY, entry_path, outside
 from studies.metrics.timing import cases as timed
-from studies.report.archive import crate
+from studies.report.archive import packing
 from studies.report.archive.checking import check
-from studies.report.archive.packing import chosen, pack, pins
-from studies.report.results import draw_charts, refresh
+from studies.report.archive.packing import pack, pins
+from studies.report.results import refresh
 from studies.runs.current import case_path
 from studies.store import archived, machine
 from studies.store.ledger import Ledger
 from studies.store.record import read_record, write_record
-from tests.studies.report.archive.conftest import DAY, STUDY
-from tests.studies.tiny import tiny_case
+from studies.sweep.load import load_runs
+from studies.sweep.run_studies import run_studies
+from tests.studies.tiny import Silent, tiny_case, tiny_study
 
 ROOT = Path(__file__).parents[4]
+DAY = "2026-11-22"
+STUDY = replace(
+    tiny_study(columns=("volume_worst", "step_time", "real_time")),
+    charts=(Chart("volume.png", "studies.plots.volume_history:draw"),),
+)
 
 
-def test_what_is_in_it(unpacked, finished_sweep):
-    names = {path.relative_to(unpacked).as_posix() for path in unpacked.rglob("*") if path.is_file()}
+@pytest.fixture(scope="session")
+def packed(finished_sweep, tmp_path_factory):
+    """The archive of the tiny study, with a chart; to be read, not changed."""
+    target = tmp_path_factory.mktemp("archive") / "tiny.zip"
+    pack(finished_sweep, [STUDY], target, DAY)
+    return target
+
+
+@pytest.fixture
+def unpacked(packed, tmp_path):
+    """A folder that it was unpacked to."""
+    with zipfile.ZipFile(packed) as archive:
+        archive.extractall(tmp_path / "unpacked")
+    return tmp_path / "unpacked"
+
+
+def test_what_is_in_it_is_what_was_stored_and_what_is_drawn_of_it(organbench, packed, unpacked, finished_sweep):
+    files = {path.relative_to(unpacked).as_posix(): path for path in unpacked.rglob("*") if path.is_file()}
     records = {case_path(Path(), "tiny", case).as_posix() for case in STUDY.cases}
     frame_times = {timed.timing_file(Path(), "tiny", case).as_posix() for case in STUDY.cases[:2]}
     drawn = {"tiny/tiny.csv", "tiny/volume.png", "tiny/tiny.h5", "kept_volume.csv", "report.html"}
     about = {"README.md", "CITATION.cff", "constraints.txt", "machine.json", archived.CRATE, archived.MANIFEST}
-    assert {name for name in names if not name.startswith("code/")} == records | frame_times | drawn | about
+    assert {name for name in files if not name.startswith("code/")} == records | frame_times | drawn | about
     for name in records:
-        assert (unpacked / name).read_bytes() == (finished_sweep / name).read_bytes()
+        assert files[name].read_bytes() == (finished_sweep / name).read_bytes()
+    assert files.pop(archived.MANIFEST).read_text().count("\n") == len(files) > 500
+    assert check(unpacked) == check(packed) == len(files)
+    assert organbench("archive", "--check", packed)[:2] == (0, f"{packed}: {len(files)} files, each as it was packed\n")
 
 
 def test_charts_and_tables_are_drawn_again_on_another_machine_by_other_code(unpacked, monkeypatch):
@@ -56,6 +83,9 @@ def test_charts_and_tables_are_drawn_again_on_another_machine_by_other_code(unpa
     assert (table.read_bytes(), chart.read_bytes()) == before
 
 
+OWN_FILE = f"import sys\nsys.path.append({str(ROOT)!r})\nfrom {__name__} import STUDY\n"
+
+
 @pytest.mark.campaign
 def test_the_code_in_it_draws_by_itself(unpacked, tmp_path):
     """A process that knows no other code of organbench."""
@@ -63,7 +93,7 @@ def test_the_code_in_it_draws_by_itself(unpacked, tmp_path):
     before = table.read_bytes()
     table.unlink()
     file = tmp_path / "tiny_file.py"
-    file.write_text(STUDY_FILE)
+    file.write_text(OWN_FILE)
     env = {**os.environ, "PYTHONPATH": str(unpacked / "code")}
     program = "import studies.__main__ as m; assert 'unpacked' in m.__file__, m.__file__; m.main()"
     command = [sys.executable, "-c", program, "report", str(file), "--results", str(unpacked)]
@@ -71,38 +101,25 @@ def test_the_code_in_it_draws_by_itself(unpacked, tmp_path):
     assert table.read_bytes() == before
 
 
-STUDY_FILE = f"""
-import sys
-sys.path.append({str(ROOT)!r})
-from tests.studies.report.archive.conftest import STUDY
-"""
-
-
-def test_the_manifest_names_every_file(unpacked):
-    lines = (unpacked / archived.MANIFEST).read_text().splitlines()
-    digests = {name: digest for digest, name in (line.split("  ") for line in lines)}
-    files = {path.relative_to(unpacked).as_posix(): path for path in unpacked.rglob("*") if path.is_file()}
-    del files[archived.MANIFEST]
-    assert digests == {name: hashlib.sha256(path.read_bytes()).hexdigest() for name, path in files.items()}
-
-
-def test_the_metadata_are_those_of_a_crate(unpacked):
+def test_the_metadata_are_those_of_a_crate_and_of_the_citation(unpacked):
     """The rules of RO-Crate 1.1 that a reader relies on."""
-    data = json.loads((unpacked / archived.CRATE).read_text())
+    data, cited = json.loads((unpacked / archived.CRATE).read_text()), packing.citation()
     assert data["@context"] == "https://w3id.org/ro/crate/1.1/context"
     entities = {entity["@id"]: entity for entity in data["@graph"]}
-    assert len(entities) == len(data["@graph"])
     head, root = entities[archived.CRATE], entities["./"]
     assert head["about"] == {"@id": "./"} and head["conformsTo"]["@id"].endswith("/ro/crate/1.1")
-    assert root["datePublished"] == DAY and {"name", "description", "license"} <= root.keys()
-    parts = [part["@id"] for part in root["hasPart"]]
-    assert all((unpacked / part).exists() for part in parts) and "tiny/tiny.csv" in parts
+    assert root["datePublished"] == DAY and "tiny" in root["name"] and root["description"].startswith(cited["abstract"])
+    assert root["license"] == {"@id": f"https://spdx.org/licenses/{cited['license']}"}
+    assert all((unpacked / part["@id"]).exists() for part in root["hasPart"])
     for value in (value for entity in data["@graph"] for value in entity.values()):
         for link in value if isinstance(value, list) else [value]:
             if isinstance(link, dict):
                 assert link["@id"] in entities or link["@id"].startswith("https://w3id.org/")
-    assert entities["tiny/tiny.csv"]["encodingFormat"] == "text/csv"
-    assert {"@id": "tiny/volume.png"} in entities["#run-tiny"]["result"]
+    table = entities["tiny/tiny.csv"]
+    assert table["encodingFormat"] == "text/csv"
+    assert table["sha256"] == hashlib.sha256((unpacked / "tiny" / "tiny.csv").read_bytes()).hexdigest()
+    assert (unpacked / "CITATION.cff").read_bytes() == (ROOT / "CITATION.cff").read_bytes()
+    assert cited["version"] == version("organbench")
 
 
 def test_equal_results_are_equal_bytes(packed, finished_sweep, tmp_path):
@@ -111,21 +128,11 @@ def test_equal_results_are_equal_bytes(packed, finished_sweep, tmp_path):
     assert [path.name for path in tmp_path.iterdir()] == ["again.zip"]
 
 
-def test_a_whole_archive_passes_the_check(organbench, packed, unpacked):
-    count = check(packed)
-    assert check(unpacked) == count > 500
-    assert organbench("archive", "--check", packed)[:2] == (0, f"{packed}: {count} files, each as it was packed\n")
-
-
-def test_all_that_is_stored_is_chosen(finished_sweep):
-    assert chosen(finished_sweep, [STUDY, replace(STUDY, name="other")]) == [STUDY]
-
-
 def test_studies_of_files_are_named_and_not_left_out_silently(organbench, refused, results, tmp_path, monkeypatch):
     words = ("archive", "-o", tmp_path / "all.zip", "--results", results)
     assert f"in {results} only studies of files are stored (tiny); name them: FILE.py" in refused(*words)
     shutil.copytree(results / "tiny", results / "mine")
-    monkeypatch.setattr(archive_command, "STUDIES", (STUDY,))
+    monkeypatch.setattr(archive_command, "STUDIES", (STUDY, replace(STUDY, name="other")))
     code, out, err = organbench(*words)
     assert code == 0 and "warning: not packed: mine, of files; name them, as in `organbench archive FILE.py`" in err
     assert f": {check(tmp_path / 'all.zip')} files" in out
@@ -161,32 +168,81 @@ def test_the_versions_are_those_installed():
     assert not any(line.startswith("pytest==") for line in lines)
 
 
-def test_an_archive_is_cited_as_the_repository(unpacked):
-    file = ROOT / "CITATION.cff"
-    assert (unpacked / "CITATION.cff").read_bytes() == file.read_bytes()
-    cited, entities = crate.citation(), json.loads((unpacked / archived.CRATE).read_text())["@graph"]
-    assert cited["version"] == version("organbench")
-    (root,) = (entity for entity in entities if entity["@id"] == "./")
-    assert root["description"].startswith(cited["abstract"])
-    assert root["license"] == {"@id": f"https://spdx.org/licenses/{cited['license']}"}
-
-
-def test_the_citation_lies_next_to_the_code_of_an_archive(tmp_path, monkeypatch):
-    monkeypatch.setattr(crate, "ROOT", tmp_path / "code")
-    (tmp_path / "CITATION.cff").write_text("")
-    assert crate.citation_file() == tmp_path / "CITATION.cff"
-
-
-def test_a_missing_citation_is_one_sentence(tmp_path, monkeypatch):
-    monkeypatch.setattr(crate, "ROOT", tmp_path / "code")
-    monkeypatch.setattr(crate, "DISTRIBUTION", "not-installed")
+def test_the_citation_lies_next_to_the_code_of_an_archive_or_is_missed(tmp_path, monkeypatch):
+    monkeypatch.setattr(packing, "ROOT", tmp_path / "code")
+    monkeypatch.setattr(packing, "DISTRIBUTION", "not-installed")
     with pytest.raises(StudyError, match=r"CITATION\.cff is missing: install organbench again"):
-        crate.citation()
+        packing.citation()
+    (tmp_path / "CITATION.cff").write_text("")
+    assert packing.citation_file() == tmp_path / "CITATION.cff"
 
 
-def test_charts_are_drawn_into_the_folder_that_is_named(packed, tmp_path):
-    """The chart of the archive shows its records: drawn of other runs it is another one."""
+def test_a_file_that_is_missing_or_changed_is_named(refused, unpacked):
+    path = case_path(unpacked, "tiny", tiny_case())
+    path.write_bytes(path.read_bytes()[:-1] + b"?")
+    sentence = refused("archive", "--check", unpacked)
+    assert f"tiny/{path.name} has changed since it was packed: get the archive again" in sentence
+    path.unlink()
+    assert f"{unpacked} lacks tiny/{path.name}" in refused("archive", "--check", unpacked)
+    runs, remarks = load_runs(unpacked, STUDY)
+    assert len(runs) == 2 and remarks == [f"case {tiny_case().name} is missing in the archive"]
+
+
+@pytest.mark.parametrize("keep", [0.999, 0.5, 0.0])
+def test_an_archive_that_was_cut_off_is_one_sentence(refused, packed, tmp_path, keep):
+    content = packed.read_bytes()
+    (tmp_path / "cut.zip").write_bytes(content[: int(keep * len(content))])
+    assert "cut.zip is cut off or damaged" in refused("archive", "--check", tmp_path / "cut.zip")
+
+
+def test_a_bit_that_flips_is_noticed(refused, packed, tmp_path):
     with zipfile.ZipFile(packed) as archive:
-        shown = archive.read("tiny/volume.png")
-    (path,) = draw_charts(tmp_path, STUDY, [])
-    assert path.read_bytes() != shown
+        entry = archive.getinfo("tiny/volume.png")
+    content = bytearray(packed.read_bytes())
+    content[entry.header_offset + 60 + entry.compress_size // 2] ^= 1
+    (tmp_path / "bit.zip").write_bytes(content)
+    assert "tiny/volume.png" in refused("archive", "--check", tmp_path / "bit.zip")
+
+
+BAD_WORDS = {
+    "is not an archive of organbench": ("--check", "other.zip"),
+    "it has no manifest-sha256.txt": ("--check", "."),
+    "there is no archive": ("--check", "none.zip"),
+    "nothing is stored in": ("--results", "."),
+    "unknown study 'stres'": ("stres", "--results", "."),
+    "an archive ends in .zip": ("stress", "-o", "a.tar", "--results", "."),
+}
+
+
+@pytest.mark.parametrize("message", BAD_WORDS)
+def test_bad_words_are_one_sentence(refused, tmp_path, monkeypatch, message):
+    monkeypatch.chdir(tmp_path)
+    with zipfile.ZipFile("other.zip", "w") as other:
+        other.writestr("a.txt", "")
+    assert message in refused("archive", *BAD_WORDS[message])
+
+
+def test_what_is_missing_damaged_or_stale_is_not_packed(results, tmp_path):
+    path, target = case_path(results, "tiny", tiny_case()), tmp_path / "new.zip"
+    record = read_record(path)
+    for spoil, reason in (
+        (lambda: write_record(path, replace(record, fingerprint="0")), "is stale"),
+        (lambda: path.write_bytes(path.read_bytes()[:-9]), "is stale"),
+        (path.unlink, "is missing"),
+    ):
+        spoil()
+        with pytest.raises(StudyError, match=rf"not archived: {tiny_case().name} {reason}.*organbench run tiny"):
+            pack(results, [STUDY], target, DAY)
+    assert not target.exists() and not list(tmp_path.glob("new-*"))
+
+
+def test_nothing_runs_in_an_archive_none_is_packed_again_and_its_machine_is_needed(unpacked, tmp_path):
+    with pytest.raises(StudyError, match="is an unpacked archive, which stays as it is"):
+        run_studies(unpacked, [STUDY], 1, Silent())
+    with pytest.raises(StudyError, match="is an unpacked archive"):
+        pack(unpacked, [STUDY], tmp_path / "again.zip", DAY)
+    for content in ("{", "[]", "{}", None):
+        path = unpacked / "machine.json"
+        path.unlink() if content is None else path.write_text(content)
+        remarks = load_runs(unpacked, STUDY)[1]
+        assert remarks and all("machine.json is" in remark for remark in remarks)
