@@ -1,1 +1,1 @@
-"""A campaign that tries to break every method: random bodies, steps, starts and surroundings, each ending named."""
+"""Random trials that try to break every method."""
