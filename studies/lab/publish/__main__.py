@@ -23,8 +23,6 @@ EXTRAS = {
     "figures": "organbench report --figures",
     "silicone": "python -m studies.lab.silicone",
     "breaking": "organbench fuzz --cases 10000",
-    "breaking_reference": "organbench fuzz --reference --cases 300",
-    "breaking_cuts": "organbench fuzz --cuts --cases 1000",
     "reference": "organbench report",
     "kept_volume.csv": "organbench report",
     "summary.md": "organbench report",

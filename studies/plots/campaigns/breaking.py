@@ -47,7 +47,7 @@ FEWEST = 5
 def figure(table: pd.DataFrame) -> Figure:
     """Left: the share of each status, a bar for each method. Right: the share that ends ok, by range of the step.
 
-    table: a row for each trial (studies.tools.fuzz.campaign.table_of).
+    table: a row for each trial (studies.tools.fuzz.outcome.table_of).
     """
     runs = [
         row for row in zip(table["method"], table["status"], table["dt_fraction"], strict=True) if row[1] != REFUSED

@@ -86,7 +86,9 @@ def _built(trial: Trial, points: np.ndarray, cells: np.ndarray, material: ms.Mat
         points, triangles, _, count = surface_first(points, cells)
         return ms.surface_body(points[:count], triangles, material)
     body = ms.tetrahedral_body(points, boundary_triangles(cells), cells, material, trial.law)
-    kept = {"nodal": ms.Volumes.nodal, "patches": ms.Volumes.patches, "regions": lambda b: ms.Volumes.regions(b, REGIONS)}
+    if trial.volumes == "regions":
+        return body.keeping(ms.Volumes.regions(body, REGIONS))
+    kept = {"nodal": ms.Volumes.nodal, "patches": ms.Volumes.patches}
     return body.keeping(kept[trial.volumes](body)) if trial.volumes in kept else body
 
 
