@@ -182,4 +182,4 @@ def test_each_fault_is_found():
         "pressure": {"p": 1.001 * state.p},
         "depth": {"penetration": 1e-3},
     }.items():
-        assert faults(problem, newton, replace(state, **changes)) == [name]
+        assert name in faults(problem, newton, replace(state, **changes))
