@@ -6,7 +6,8 @@ from typing import NamedTuple
 import numpy as np
 
 from massspring.kernels.contact.constrained_motion import pushed_by_into, unpushed_into
-from massspring.kernels.jit.decorators import compiled, njit_inlined
+from massspring.kernels.jit.decorators import compiled
+from massspring.kernels.jit.vec3 import minus, row, triple
 
 POLISHES = 4
 """Newton steps after the closed form: each doubles the number of digits that cancellation has left."""
@@ -30,28 +31,18 @@ def line_into(nodes, contacts, inverse_mass, dt, line):
     pushed_by_into(contacts, inverse_mass, dt * dt, nodes.gradient, line.d)
 
 
-@njit_inlined
-def triple(a, b, c):
-    """a · (b × c) of three vectors, each a tuple of three numbers."""
-    return a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) + a[2] * (b[0] * c[1] - b[1] * c[0])
-
-
 @compiled
 def volume_cubic(y, d, triangles):
     """V(y + a d) = V + a G(y)·d + a² Σ y·g(d) + a³ V[d]: the four coefficients, on a closed surface (eq. 10.1).
 
     y is taken relative to a node of the surface, so that no digits are lost far from the origin.
     """
-    o0, o1, o2 = y[triangles[0, 0], 0], y[triangles[0, 0], 1], y[triangles[0, 0], 2]
+    origin = row(y, triangles[0, 0])
     k0, k1, k2, k3 = 0.0, 0.0, 0.0, 0.0
     for f in range(triangles.shape[0]):
         i, j, k = triangles[f, 0], triangles[f, 1], triangles[f, 2]
-        a = y[i, 0] - o0, y[i, 1] - o1, y[i, 2] - o2
-        b = y[j, 0] - o0, y[j, 1] - o1, y[j, 2] - o2
-        c = y[k, 0] - o0, y[k, 1] - o1, y[k, 2] - o2
-        p = d[i, 0], d[i, 1], d[i, 2]
-        q = d[j, 0], d[j, 1], d[j, 2]
-        r = d[k, 0], d[k, 1], d[k, 2]
+        a, b, c = minus(row(y, i), origin), minus(row(y, j), origin), minus(row(y, k), origin)
+        p, q, r = row(d, i), row(d, j), row(d, k)
         k0 += triple(a, b, c)
         k1 += triple(p, b, c)
         k1 += triple(a, q, c)

@@ -2,10 +2,11 @@
 
 import math
 
+from massspring.kernels.contact.constrained_motion import after_contact, allowed
 from massspring.kernels.contact.modes import FREE
-from massspring.kernels.contact.node_contact import allowed_part
 from massspring.kernels.jit.decorators import compiled, njit_lean
 from massspring.kernels.jit.row_sums import copy_scaled, sum_of_areas, sum_of_products, sum_of_scaled, sums_from_origin
+from massspring.kernels.jit.vec3 import dot, minus, plus, put, row, times
 
 NEGLIGIBLE_DIAGONAL = 1e-12
 """Ratio to its summands below which a diagonal or pivot counts as round-off."""
@@ -17,7 +18,7 @@ def rows_into(x, inverse_mass, rows):
     [m⁴/kg]."""
     padded = rows.node_vector
     for i in range(x.shape[0]):
-        padded[i, 0], padded[i, 1], padded[i, 2] = x[i, 0], x[i, 1], x[i, 2]
+        put(padded, i, row(x, i))
     areas_into(rows, padded)
     for r in range(rows.volume.shape[0]):
         first, last = rows.row_start[r], rows.row_start[r + 1]
@@ -49,8 +50,7 @@ def rows_times_into(rows, u, product):
     for r in range(product.shape[0]):
         total = 0.0
         for e in range(rows.row_start[r], rows.row_start[r + 1]):
-            j = rows.column[e]
-            total += rows.value[e, 0] * u[j, 0] + rows.value[e, 1] * u[j, 1] + rows.value[e, 2] * u[j, 2]
+            total += dot(row(rows.value, e), row(u, rows.column[e]))
         product[r] = total
 
 
@@ -65,44 +65,30 @@ def padded_rows_times_into(rows, u, product):
 @njit_lean
 def transposed_rows_times_into(rows, p, out):
     """(Jᵀ p)_j = Σ_r J_rj p_r, (n, 3): with pressures p [Pa] the force of all volumes on each node [N]."""
-    u, start, row, value = rows.node_vector, rows.node_start, rows.node_row, rows.node_value
+    u, start, index, value = rows.node_vector, rows.node_start, rows.node_row, rows.node_value
     for j in range(out.shape[0]):
-        sum_of_scaled(start[j], start[j + 1], row, value, p, 1.0, u, j)
+        sum_of_scaled(start[j], start[j + 1], index, value, p, 1.0, u, j)
     for j in range(out.shape[0]):
-        out[j, 0], out[j, 1], out[j, 2] = u[j, 0], u[j, 1], u[j, 2]
+        put(out, j, row(u, j))
 
 
 @compiled
 def pushed_velocity_into(nodes, contacts, inverse_mass, force, dt, u):
     """u = ṽ + dt W̃ F [m/s], (n, 3), with a force F [N] on every node (eq. 3.4, 3.5)."""
     for i in range(u.shape[0]):
-        w = dt * inverse_mass[i]
-        u0 = nodes.v_star[i, 0] + w * force[i, 0]
-        u1 = nodes.v_star[i, 1] + w * force[i, 1]
-        u2 = nodes.v_star[i, 2] + w * force[i, 2]
-        if contacts.mode[i] > FREE:
-            d0, d1, d2 = contacts.direction[i, 0], contacts.direction[i, 1], contacts.direction[i, 2]
-            u0, u1, u2 = allowed_part(contacts.mode[i], d0, d1, d2, u0, u1, u2)
-            u0, u1, u2 = u0 + contacts.v_target[i, 0], u1 + contacts.v_target[i, 1], u2 + contacts.v_target[i, 2]
-        u[i, 0], u[i, 1], u[i, 2] = u0, u1, u2
+        pushed = plus(row(nodes.v_star, i), times(dt * inverse_mass[i], row(force, i)))
+        put(u, i, after_contact(contacts, i, pushed))
 
 
 @njit_lean
 def mobilised_into(rows, contacts, inverse_mass, p, u):
     """u = W̃ Jᵀ p, (n, 4): no motion of a held node, none into an obstacle (eq. 3.4)."""
-    start, row, value, mode, direction = (
-        rows.node_start,
-        rows.node_row,
-        rows.node_value,
-        contacts.mode,
-        contacts.direction,
-    )
+    start, index, value, mode = rows.node_start, rows.node_row, rows.node_value, contacts.mode
     for i in range(u.shape[0]):
-        sum_of_scaled(start[i], start[i + 1], row, value, p, inverse_mass[i], u, i)
+        sum_of_scaled(start[i], start[i + 1], index, value, p, inverse_mass[i], u, i)
     for i in range(u.shape[0]):
         if mode[i] > FREE:
-            d0, d1, d2 = direction[i, 0], direction[i, 1], direction[i, 2]
-            u[i, 0], u[i, 1], u[i, 2] = allowed_part(mode[i], d0, d1, d2, u[i, 0], u[i, 1], u[i, 2])
+            put(u, i, allowed(contacts, i, row(u, i)))
 
 
 @compiled
@@ -115,12 +101,9 @@ def diagonal_into(rows, contacts, inverse_mass, diagonal):
         diagonal[r] = rows.free_diagonal[r]
     for j in range(inverse_mass.shape[0]):
         if contacts.mode[j] > FREE:
-            d0, d1, d2 = contacts.direction[j, 0], contacts.direction[j, 1], contacts.direction[j, 2]
             for k in range(rows.node_start[j], rows.node_start[j + 1]):
-                g0, g1, g2 = rows.node_value[k, 0], rows.node_value[k, 1], rows.node_value[k, 2]
-                p0, p1, p2 = allowed_part(contacts.mode[j], d0, d1, d2, g0, g1, g2)
-                taken = g0 * (g0 - p0) + g1 * (g1 - p1) + g2 * (g2 - p2)
-                diagonal[rows.node_row[k]] -= inverse_mass[j] * taken
+                g = row(rows.node_value, k)
+                diagonal[rows.node_row[k]] -= inverse_mass[j] * dot(g, minus(g, allowed(contacts, j, g)))
     for r in range(diagonal.shape[0]):
         if not diagonal[r] > NEGLIGIBLE_DIAGONAL * rows.free_diagonal[r]:
             diagonal[r] = 0.0
@@ -131,6 +114,6 @@ def steepest_of_row(rows, inverse_mass, r):
     """max_j w_j |J_rj| [m²/kg]: how far the node that moves most goes per unit of pressure and dt²."""
     steepest = 0.0
     for e in range(rows.row_start[r], rows.row_start[r + 1]):
-        g0, g1, g2 = rows.value[e, 0], rows.value[e, 1], rows.value[e, 2]
-        steepest = max(steepest, inverse_mass[rows.column[e]] * math.sqrt(g0 * g0 + g1 * g1 + g2 * g2))
+        g = row(rows.value, e)
+        steepest = max(steepest, inverse_mass[rows.column[e]] * math.sqrt(dot(g, g)))
     return steepest

@@ -6,6 +6,7 @@ import numpy as np
 
 from massspring.kernels.jit.by_address import by_address
 from massspring.kernels.jit.decorators import njit_lean
+from massspring.kernels.jit.vec3 import minus, put, row, take_from, times
 
 
 @by_address
@@ -29,26 +30,17 @@ class Triangular(NamedTuple):
 @njit_lean
 def respond_into(factor, force, moved):
     """A⁻¹ F, (n, 3): forward with L, then with D and back with Lᵀ; nodes without a column do not move (eq. 12.1)."""
-    start, row, value, node, z = factor.start, factor.row, factor.value, factor.node, factor.scratch
+    start, below, value, node, z = factor.start, factor.row, factor.value, factor.node, factor.scratch
     moved[:] = 0.0
     for j in range(node.shape[0]):
-        i = node[j]
-        z[j, 0], z[j, 1], z[j, 2] = force[i, 0], force[i, 1], force[i, 2]
+        put(z, j, row(force, node[j]))
     for j in range(node.shape[0]):
-        a0, a1, a2 = z[j, 0], z[j, 1], z[j, 2]
+        a = row(z, j)
         for e in range(start[j], start[j + 1]):
-            i, share = row[e], value[e]
-            z[i, 0] -= share * a0
-            z[i, 1] -= share * a1
-            z[i, 2] -= share * a2
+            take_from(z, below[e], times(value[e], a))
     for j in range(node.shape[0] - 1, -1, -1):
-        pivot = factor.inverse_pivot[j]
-        a0, a1, a2 = pivot * z[j, 0], pivot * z[j, 1], pivot * z[j, 2]
+        a = times(factor.inverse_pivot[j], row(z, j))
         for e in range(start[j], start[j + 1]):
-            i, share = row[e], value[e]
-            a0 -= share * z[i, 0]
-            a1 -= share * z[i, 1]
-            a2 -= share * z[i, 2]
-        z[j, 0], z[j, 1], z[j, 2] = a0, a1, a2
-        i = node[j]
-        moved[i, 0], moved[i, 1], moved[i, 2] = a0, a1, a2
+            a = minus(a, times(value[e], row(z, below[e])))
+        put(z, j, a)
+        put(moved, node[j], a)

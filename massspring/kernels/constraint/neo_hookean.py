@@ -2,35 +2,29 @@
 
 import math
 
-from massspring.kernels.constraint.tetrahedra import moved_by
-from massspring.kernels.forces.corotated import cofactors
-from massspring.kernels.forces.elements import deformation
+from massspring.kernels.contact.constrained_motion import moved_by
+from massspring.kernels.forces.elements import cofactors, deformation, matrix_times
 from massspring.kernels.jit.decorators import compiled, njit_inlined
+from massspring.kernels.jit.vec3 import add_to, dot, plus, row, times
 
 
 @njit_inlined
 def gradient_of(elements, m, factor, e, a):
     """`factor` M ∇N_a [1/m] of a node a of element e."""
-    g = elements.gradient
-    g0, g1, g2 = factor * g[e, 0, a, 0], factor * g[e, 0, a, 1], factor * g[e, 0, a, 2]
-    first, second = m[0] * g0 + m[1] * g1 + m[2] * g2, m[3] * g0 + m[4] * g1 + m[5] * g2
-    return first, second, m[6] * g0 + m[7] * g1 + m[8] * g2
+    return matrix_times(m, times(factor, row(elements.gradient[e, 0], a)))
 
 
 @njit_inlined
 def mobilities(contacts, inverse_mass, elements, f, c, shear, e):
     """∇C_D·W̃∇C_D, ∇C_D·W̃∇C_H and ∇C_H·W̃∇C_H [1/(kg m²)] of element e; `shear` is C_D."""
-    mode, direction = contacts.mode, contacts.direction
     own, mixed, volume = 0.0, 0.0, 0.0
     for a in range(4):
         i = elements.node[e, a]
-        g0, g1, g2 = gradient_of(elements, f, 1.0 / shear, e, a)
-        h0, h1, h2 = gradient_of(elements, c, 1.0, e, a)
-        u0, u1, u2 = moved_by(inverse_mass, mode, direction, i, g0, g1, g2)
-        w0, w1, w2 = moved_by(inverse_mass, mode, direction, i, h0, h1, h2)
-        own += g0 * u0 + g1 * u1 + g2 * u2
-        mixed += g0 * w0 + g1 * w1 + g2 * w2
-        volume += h0 * w0 + h1 * w1 + h2 * w2
+        g, h = gradient_of(elements, f, 1.0 / shear, e, a), gradient_of(elements, c, 1.0, e, a)
+        u, w = moved_by(contacts, inverse_mass, i, g), moved_by(contacts, inverse_mass, i, h)
+        own += dot(g, u)
+        mixed += dot(g, w)
+        volume += dot(h, w)
     return own, mixed, volume
 
 
@@ -41,7 +35,6 @@ def relax_elements(contacts, inverse_mass, elements, y, scale, multiplier, push)
     `y` (n, 3) moves by dt² W̃ ∇C Δl, `multiplier` (k, 2) [J] and `push` (n, 3) [N] collect Δl and ∇C Δl. Returns
     whether an element has shrunk to a point, where no constraint has a gradient.
     """
-    mode, direction = contacts.mode, contacts.direction
     idle = False
     for e in range(elements.node.shape[0]):
         mu, bulk, volume = elements.constants[0], elements.constants[1], elements.weight[e, 0]
@@ -52,7 +45,7 @@ def relax_elements(contacts, inverse_mass, elements, y, scale, multiplier, push)
         if not shear > 0.0:
             idle = True
             continue
-        grown = f[0] * c[0] + f[1] * c[1] + f[2] * c[2] - elements.target_ratio[e, 0] - mu / bulk
+        grown = dot(f, c) - elements.target_ratio[e, 0] - mu / bulk
         own, mixed, other = mobilities(contacts, inverse_mass, elements, f, c, shear, e)
         soft, hard = 1.0 / (mu * volume), 1.0 / (bulk * volume)
         a00, a01, a11 = scale * own + soft, scale * mixed, scale * other + hard
@@ -63,10 +56,7 @@ def relax_elements(contacts, inverse_mass, elements, y, scale, multiplier, push)
         multiplier[e, 1] += l1
         for a in range(4):
             i = elements.node[e, a]
-            g0, g1, g2 = gradient_of(elements, f, l0 / shear, e, a)
-            h0, h1, h2 = gradient_of(elements, c, l1, e, a)
-            g0, g1, g2 = g0 + h0, g1 + h1, g2 + h2
-            d0, d1, d2 = moved_by(inverse_mass, mode, direction, i, g0, g1, g2)
-            push[i, 0], push[i, 1], push[i, 2] = push[i, 0] + g0, push[i, 1] + g1, push[i, 2] + g2
-            y[i, 0], y[i, 1], y[i, 2] = y[i, 0] + scale * d0, y[i, 1] + scale * d1, y[i, 2] + scale * d2
+            g = plus(gradient_of(elements, f, l0 / shear, e, a), gradient_of(elements, c, l1, e, a))
+            add_to(push, i, g)
+            add_to(y, i, times(scale, moved_by(contacts, inverse_mass, i, g)))
     return idle

@@ -2,9 +2,11 @@
 
 import math
 
+from massspring.kernels.contact.constrained_motion import allowed
 from massspring.kernels.contact.modes import FREE
-from massspring.kernels.contact.node_contact import allowed_part, taken_share
+from massspring.kernels.contact.node_contact import taken_share
 from massspring.kernels.jit.decorators import njit_exposed, njit_inlined, njit_lean
+from massspring.kernels.jit.vec3 import dot, row
 
 NEGLIGIBLE_MOBILITY = 1e-12
 """Ratio to the mobility without contact below which a mobility counts as round-off."""
@@ -17,22 +19,16 @@ def volume_multiplier(nodes, contacts, inverse_mass, volume_error, dt):
     ṽ, W̃: velocity and inverse mass of a touched node act only along its obstacle (eq. 3.4). `volume_error` is V0 − V.
     Limit: without a gradient no pressure can act; lam is 0 if G·W̃·G is not positive.
     """
-    flow = 0.0
-    mobility = 0.0
+    flow, mobility = 0.0, 0.0
     for i in range(inverse_mass.shape[0]):
-        g0, g1, g2 = nodes.gradient[i, 0], nodes.gradient[i, 1], nodes.gradient[i, 2]
-        v0, v1, v2 = nodes.v_star[i, 0], nodes.v_star[i, 1], nodes.v_star[i, 2]
-        flow += g0 * v0 + g1 * v1 + g2 * v2
-        square = g0 * g0 + g1 * g1 + g2 * g2
+        g, v = row(nodes.gradient, i), row(nodes.v_star, i)
+        flow += dot(g, v)
+        square = dot(g, g)
         if contacts.mode[i] > FREE:
-            mode = contacts.mode[i]
-            d0, d1, d2 = contacts.direction[i, 0], contacts.direction[i, 1], contacts.direction[i, 2]
-            p0, p1, p2 = allowed_part(mode, d0, d1, d2, g0, g1, g2)
-            square = g0 * p0 + g1 * p1 + g2 * p2
-            p0, p1, p2 = allowed_part(mode, d0, d1, d2, v0, v1, v2)
-            flow += g0 * (p0 + contacts.v_target[i, 0] - v0)
-            flow += g1 * (p1 + contacts.v_target[i, 1] - v1)
-            flow += g2 * (p2 + contacts.v_target[i, 2] - v2)
+            square = dot(g, allowed(contacts, i, g))
+            p, target = allowed(contacts, i, v), contacts.v_target
+            for axis in range(3):
+                flow += g[axis] * (p[axis] + target[i, axis] - v[axis])
         mobility += inverse_mass[i] * square
     if not mobility > 0.0:
         return 0.0, mobility
@@ -42,22 +38,14 @@ def volume_multiplier(nodes, contacts, inverse_mass, volume_error, dt):
 @njit_exposed
 def multiplier_of_sums(nodes, contacts, inverse_mass, volume_error, dt, flow, mobility):
     """The same from the sums G·v* and G·W·G over all nodes, corrected at the few touched nodes (eq. 3.3, 3.4)."""
-    mode, direction, v_target, gradient, v_star = (
-        contacts.mode,
-        contacts.direction,
-        contacts.v_target,
-        nodes.gradient,
-        nodes.v_star,
-    )
-    free = mobility
+    mode, free = contacts.mode, mobility
     for k in range(contacts.active_count[0]):
         i = contacts.active[k]
         if mode[i] > FREE:
-            g = gradient[i, 0], gradient[i, 1], gradient[i, 2]
-            d = direction[i, 0], direction[i, 1], direction[i, 2]
+            g, d = row(nodes.gradient, i), row(contacts.direction, i)
             mobility -= inverse_mass[i] * taken_share(mode[i], d, g, g)
-            flow -= taken_share(mode[i], d, g, (v_star[i, 0], v_star[i, 1], v_star[i, 2]))
-            flow += g[0] * v_target[i, 0] + g[1] * v_target[i, 1] + g[2] * v_target[i, 2]
+            flow -= taken_share(mode[i], d, g, row(nodes.v_star, i))
+            flow += dot(g, row(contacts.v_target, i))
     if mobility <= NEGLIGIBLE_MOBILITY * free:
         return 0.0, 0.0
     return (volume_error - dt * flow) / (dt * dt * mobility), mobility
@@ -68,8 +56,8 @@ def steepest(gradient, inverse_mass):
     """max_i w_i |G_i| [m²/kg]: how far the node that moves most goes per unit of pressure and dt²."""
     largest = 0.0
     for i in range(inverse_mass.shape[0]):
-        square = gradient[i, 0] ** 2 + gradient[i, 1] ** 2 + gradient[i, 2] ** 2
-        largest = max(largest, inverse_mass[i] * math.sqrt(square))
+        g = row(gradient, i)
+        largest = max(largest, inverse_mass[i] * math.sqrt(dot(g, g)))
     return largest
 
 

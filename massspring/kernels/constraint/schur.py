@@ -4,10 +4,10 @@ import math
 
 from massspring.kernels.constraint.block_jacobi import precondition_into, scale_into
 from massspring.kernels.constraint.jacobian import NEGLIGIBLE_DIAGONAL, mobilised_into, padded_rows_times_into
+from massspring.kernels.contact.constrained_motion import allowed
 from massspring.kernels.contact.face_pairs import part_faces
-from massspring.kernels.contact.modes import FREE
-from massspring.kernels.contact.node_contact import allowed_part
 from massspring.kernels.jit.decorators import compiled, njit_inlined, njit_lean, njit_reassociated
+from massspring.kernels.jit.vec3 import dot, row, times
 
 
 @compiled
@@ -19,16 +19,11 @@ def dense_into(rows, contacts, inverse_mass, matrix):
         if w == 0.0:
             continue
         for k in range(rows.node_start[j], rows.node_start[j + 1]):
-            e, r = rows.node_entry[k], rows.node_row[k]
-            g0, g1, g2 = rows.value[e, 0], rows.value[e, 1], rows.value[e, 2]
-            if contacts.mode[j] > FREE:
-                d0, d1, d2 = contacts.direction[j, 0], contacts.direction[j, 1], contacts.direction[j, 2]
-                g0, g1, g2 = allowed_part(contacts.mode[j], d0, d1, d2, g0, g1, g2)
-            g0, g1, g2 = w * g0, w * g1, w * g2
+            r = rows.node_row[k]
+            g = times(w, allowed(contacts, j, row(rows.value, rows.node_entry[k])))
             # The volumes around a node come in ascending order.
             for q in range(rows.node_start[j], k + 1):
-                e = rows.node_entry[q]
-                matrix[r, rows.node_row[q]] += g0 * rows.value[e, 0] + g1 * rows.value[e, 1] + g2 * rows.value[e, 2]
+                matrix[r, rows.node_row[q]] += dot(g, row(rows.value, rows.node_entry[q]))
 
 
 @compiled
@@ -89,7 +84,7 @@ def apply_schur(rows, contacts, inverse_mass, p, product, pairs=None):
 
 
 @njit_reassociated
-def dot(a, b):
+def inner_product(a, b):
     """a · b."""
     total = 0.0
     for r in range(a.shape[0]):
@@ -135,7 +130,7 @@ def solve_iteratively(rows, contacts, inverse_mass, lam, allowed, most, pairs=No
         for r in range(search.shape[0]):
             search[r] = image[r] + keep * search[r]
         apply_schur(rows, contacts, inverse_mass, search, image, pairs)
-        curvature = dot(search, image)
+        curvature = inner_product(search, image)
         if not curvature > 0.0:
             break
         along(search, image, rho / curvature, lam, residual)

@@ -1,12 +1,11 @@
 """The volumes of all tetrahedra solved for at the end of a step: together, or one after the other (eq. 10.13,
 10.14)."""
 
-from massspring.kernels.contact.constrained_motion import pushed_by_into, unpushed_into
-from massspring.kernels.contact.modes import FREE
-from massspring.kernels.contact.node_contact import allowed_part
-from massspring.kernels.forces.tetrahedron_volumes import add_four, cell_slopes, mean_pressure
+from massspring.kernels.contact.constrained_motion import moved_by, pushed_by_into, unpushed_into
+from massspring.kernels.forces.tetrahedron_volumes import add_four, cell_slopes, four, mean_pressure
 from massspring.kernels.forces.volume import volume_gradient_into
-from massspring.kernels.jit.decorators import compiled, njit_inlined
+from massspring.kernels.jit.decorators import compiled
+from massspring.kernels.jit.vec3 import add_to, dot, minus, put, row, times
 
 WRONG = 1e-6
 """Relative volume error above which a volume that cannot be corrected is counted; 1 % of the error that a kept volume
@@ -16,27 +15,21 @@ may have."""
 @compiled
 def cell_rows_into(x, cells, out):
     """J = dV_t/dx into `cells.slope` [m²] and V_t into `out` [m³], (k,) (eq. 2.3, 10.11)."""
-    tetrahedra, s = cells.tetrahedra, cells.slope
-    for t in range(tetrahedra.shape[0]):
-        a, b, c, d = tetrahedra[t, 0], tetrahedra[t, 1], tetrahedra[t, 2], tetrahedra[t, 3]
-        volume, p0, p1, p2, q0, q1, q2, r0, r1, r2 = cell_slopes(x, a, b, c, d)
-        s[t, 0, 0], s[t, 0, 1], s[t, 0, 2] = p0, p1, p2
-        s[t, 1, 0], s[t, 1, 1], s[t, 1, 2] = q0, q1, q2
-        s[t, 2, 0], s[t, 2, 1], s[t, 2, 2] = r0, r1, r2
-        out[t] = volume
+    for t in range(cells.tetrahedra.shape[0]):
+        out[t], p, q, r = cell_slopes(x, four(cells.tetrahedra, t))
+        slope = cells.slope[t]
+        put(slope, 0, p)
+        put(slope, 1, q)
+        put(slope, 2, r)
 
 
 @compiled
 def cell_forces_into(cells, p, force):
     """F = Jᵀ p [N], (n, 3)."""
     force[:] = 0.0
-    tetrahedra, s = cells.tetrahedra, cells.slope
-    for t in range(tetrahedra.shape[0]):
-        a, b, c, d = tetrahedra[t, 0], tetrahedra[t, 1], tetrahedra[t, 2], tetrahedra[t, 3]
-        p0, p1, p2 = s[t, 0, 0], s[t, 0, 1], s[t, 0, 2]
-        q0, q1, q2 = s[t, 1, 0], s[t, 1, 1], s[t, 1, 2]
-        r0, r1, r2 = s[t, 2, 0], s[t, 2, 1], s[t, 2, 2]
-        add_four(force, (a, b, c, d), p[t], (p0, p1, p2), (q0, q1, q2), (r0, r1, r2))
+    for t in range(cells.tetrahedra.shape[0]):
+        s = cells.slope[t]
+        add_four(force, four(cells.tetrahedra, t), p[t], row(s, 0), row(s, 1), row(s, 2))
 
 
 @compiled
@@ -44,41 +37,24 @@ def cell_changes_into(cells, u, out):
     """(J u)_t = Σ_j dV_t/dx_j · u_j, (k,)."""
     tetrahedra, s = cells.tetrahedra, cells.slope
     for t in range(tetrahedra.shape[0]):
-        a = tetrahedra[t, 0]
         total = 0.0
         for corner in range(3):
-            i = tetrahedra[t, corner + 1]
-            total += s[t, corner, 0] * (u[i, 0] - u[a, 0])
-            total += s[t, corner, 1] * (u[i, 1] - u[a, 1])
-            total += s[t, corner, 2] * (u[i, 2] - u[a, 2])
+            i, a = tetrahedra[t, corner + 1], tetrahedra[t, 0]
+            for axis in range(3):
+                total += s[t, corner, axis] * (u[i, axis] - u[a, axis])
         out[t] = total
-
-
-@njit_inlined
-def moved_by(inverse_mass, mode, direction, i, g0, g1, g2):
-    """W̃ g at node i (eq. 3.4)."""
-    w = inverse_mass[i]
-    d0, d1, d2 = w * g0, w * g1, w * g2
-    if mode[i] > FREE:
-        d0, d1, d2 = allowed_part(mode[i], direction[i, 0], direction[i, 1], direction[i, 2], d0, d1, d2)
-    return d0, d1, d2
 
 
 @compiled
 def cell_diagonal_into(contacts, inverse_mass, cells, scale, compliance):
     """dt² S_tt + C V_t0 [m³/Pa], (k,), the diagonal of eq. 10.13; `scale` is dt²."""
-    s, tetrahedra = cells.slope, cells.tetrahedra
-    mode, direction = contacts.mode, contacts.direction
-    for t in range(tetrahedra.shape[0]):
-        total = 0.0
-        a0, a1, a2 = 0.0, 0.0, 0.0
+    for t in range(cells.tetrahedra.shape[0]):
+        total, a = 0.0, (0.0, 0.0, 0.0)
         for corner in range(3):
-            g0, g1, g2 = s[t, corner, 0], s[t, corner, 1], s[t, corner, 2]
-            a0, a1, a2 = a0 - g0, a1 - g1, a2 - g2
-            d0, d1, d2 = moved_by(inverse_mass, mode, direction, tetrahedra[t, corner + 1], g0, g1, g2)
-            total += g0 * d0 + g1 * d1 + g2 * d2
-        d0, d1, d2 = moved_by(inverse_mass, mode, direction, tetrahedra[t, 0], a0, a1, a2)
-        total += a0 * d0 + a1 * d1 + a2 * d2
+            g = row(cells.slope[t], corner)
+            a = minus(a, g)
+            total += dot(g, moved_by(contacts, inverse_mass, cells.tetrahedra[t, corner + 1], g))
+        total += dot(a, moved_by(contacts, inverse_mass, cells.tetrahedra[t, 0], a))
         cells.diagonal[t] = scale * total + compliance * cells.rest_volume[t]
 
 
@@ -168,18 +144,15 @@ def relax_cells(contacts, inverse_mass, cells, scale, compliance):
     Returns whether a volume with an error had no gradient.
     """
     idle = False
-    y, tetrahedra, pressure, rest_volume = cells.y, cells.tetrahedra, cells.pressure, cells.rest_volume
-    mode, direction, force = contacts.mode, contacts.direction, cells.push
-    for t in range(tetrahedra.shape[0]):
-        a, b, c, d = tetrahedra[t, 0], tetrahedra[t, 1], tetrahedra[t, 2], tetrahedra[t, 3]
-        volume, p0, p1, p2, q0, q1, q2, r0, r1, r2 = cell_slopes(y, a, b, c, d)
-        o0, o1, o2 = -p0 - q0 - r0, -p1 - q1 - r1, -p2 - q2 - r2
-        a0, a1, a2 = moved_by(inverse_mass, mode, direction, a, o0, o1, o2)
-        b0, b1, b2 = moved_by(inverse_mass, mode, direction, b, p0, p1, p2)
-        c0, c1, c2 = moved_by(inverse_mass, mode, direction, c, q0, q1, q2)
-        d0, d1, d2 = moved_by(inverse_mass, mode, direction, d, r0, r1, r2)
-        mobility = o0 * a0 + o1 * a1 + o2 * a2 + p0 * b0 + p1 * b1 + p2 * b2
-        mobility += q0 * c0 + q1 * c1 + q2 * c2 + r0 * d0 + r1 * d1 + r2 * d2
+    y, pressure, rest_volume = cells.y, cells.pressure, cells.rest_volume
+    for t in range(cells.tetrahedra.shape[0]):
+        nodes = a, b, c, d = four(cells.tetrahedra, t)
+        volume, p, q, r = cell_slopes(y, nodes)
+        o = minus(minus(times(-1.0, p), q), r)
+        u, v = moved_by(contacts, inverse_mass, a, o), moved_by(contacts, inverse_mass, b, p)
+        w, z = moved_by(contacts, inverse_mass, c, q), moved_by(contacts, inverse_mass, d, r)
+        mobility = o[0] * u[0] + o[1] * u[1] + o[2] * u[2] + p[0] * v[0] + p[1] * v[1] + p[2] * v[2]
+        mobility += q[0] * w[0] + q[1] * w[1] + q[2] * w[2] + r[0] * z[0] + r[1] * z[1] + r[2] * z[2]
         soft = compliance * rest_volume[t]
         stiff = scale * mobility + soft
         error = cells.filling[0] * rest_volume[t] - volume
@@ -188,38 +161,33 @@ def relax_cells(contacts, inverse_mass, cells, scale, compliance):
             continue
         change = (error - soft * pressure[t]) / stiff
         pressure[t] += change
-        add_four(force, (a, b, c, d), change, (p0, p1, p2), (q0, q1, q2), (r0, r1, r2))
+        add_four(cells.push, nodes, change, p, q, r)
         move = scale * change
-        y[a, 0], y[a, 1], y[a, 2] = y[a, 0] + move * a0, y[a, 1] + move * a1, y[a, 2] + move * a2
-        y[b, 0], y[b, 1], y[b, 2] = y[b, 0] + move * b0, y[b, 1] + move * b1, y[b, 2] + move * b2
-        y[c, 0], y[c, 1], y[c, 2] = y[c, 0] + move * c0, y[c, 1] + move * c1, y[c, 2] + move * c2
-        y[d, 0], y[d, 1], y[d, 2] = y[d, 0] + move * d0, y[d, 1] + move * d1, y[d, 2] + move * d2
+        add_to(y, a, times(move, u))
+        add_to(y, b, times(move, v))
+        add_to(y, c, times(move, w))
+        add_to(y, d, times(move, z))
     return idle
 
 
 @compiled
 def relax_whole(model, contacts, cells, target, scale, compliance, lam):
     """The same for the one volume of the whole: returns its pressure [Pa] as well, first (eq. 10.14)."""
-    y, gradient, force, inverse_mass = cells.y, cells.gradient, cells.push, model.inverse_mass
-    mode, direction = contacts.mode, contacts.direction
+    y, gradient, inverse_mass = cells.y, cells.gradient, model.inverse_mass
     volume = volume_gradient_into(y, model.triangles, gradient)
     soft = compliance * cells.rest_whole
     stiff = soft
     for i in range(y.shape[0]):
-        g0, g1, g2 = gradient[i, 0], gradient[i, 1], gradient[i, 2]
-        d0, d1, d2 = moved_by(inverse_mass, mode, direction, i, g0, g1, g2)
-        stiff += scale * (g0 * d0 + g1 * d1 + g2 * d2)
+        g = row(gradient, i)
+        stiff += scale * dot(g, moved_by(contacts, inverse_mass, i, g))
     idle = not stiff > soft and abs(target - volume) > WRONG * target
     if not stiff > 0.0:
         return lam, idle
     change = (target - volume - soft * lam) / stiff
-    move = scale * change
     for i in range(y.shape[0]):
-        g0, g1, g2 = gradient[i, 0], gradient[i, 1], gradient[i, 2]
-        d0, d1, d2 = moved_by(inverse_mass, mode, direction, i, g0, g1, g2)
-        y[i, 0], y[i, 1], y[i, 2] = y[i, 0] + move * d0, y[i, 1] + move * d1, y[i, 2] + move * d2
-        force[i, 0], force[i, 1] = force[i, 0] + change * g0, force[i, 1] + change * g1
-        force[i, 2] += change * g2
+        g = row(gradient, i)
+        add_to(y, i, times(scale * change, moved_by(contacts, inverse_mass, i, g)))
+        add_to(cells.push, i, times(change, g))
     return lam + change, idle
 
 

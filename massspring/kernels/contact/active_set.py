@@ -11,6 +11,7 @@ from massspring.kernels.contact.modes import FREE, ON_EDGE, SLIDES
 from massspring.kernels.contact.node_contact import round_contact
 from massspring.kernels.jit.blocks import BLOCK, any_gap_within
 from massspring.kernels.jit.decorators import njit_exposed, njit_inlined, njit_lean
+from massspring.kernels.jit.vec3 import dot, minus, plus, put, row, times
 
 CONTACT_PASSES = 3
 """Active-set passes a step: one when nothing changes; lam is always solved for the set that is applied."""
@@ -23,27 +24,23 @@ def activate(model, nodes, contacts, boundary, step, push, count):
     `v_target` = n a, a = n·(target − x)/dt, ends the step on the obstacle. A round one pushes along n = (x − c)/|x − c|
     of the position now, not of the prediction: that would do work on a node that slides, and pump its oscillations up.
     """
-    dt = boundary.dt
+    dt, place = boundary.dt, boundary.position[step]
     for k in range(count):
         i = contacts.entering[k]
-        u0, u1, u2 = pushed_velocity(model, nodes, boundary, push, i)
-        deepest = 0.0
+        u, deepest = pushed_velocity(model, nodes, boundary, push, i), 0.0
         for o in range(boundary.radius.shape[0]):
-            s0 = nodes.x[i, 0] - boundary.position[step, o, 0]
-            s1 = nodes.x[i, 1] - boundary.position[step, o, 1]
-            s2 = nodes.x[i, 2] - boundary.position[step, o, 2]
-            r0, r1, r2 = s0 + dt * u0, s1 + dt * u1, s2 + dt * u2
-            depth, n0, n1, n2 = gap_and_normal(boundary, o, r0, r1, r2)
+            s = minus(row(nodes.x, i), row(place, o))
+            r = plus(s, times(dt, u))
+            depth, n = gap_and_normal(boundary, o, r)
             if depth < deepest:
                 deepest, lift = depth, -depth
                 if not boundary.is_plane[o]:
-                    axis = boundary.span[o, 0], boundary.span[o, 1], boundary.span[o, 2]
-                    n0, n1, n2, lift = round_contact((s0, s1, s2), (r0, r1, r2), axis, boundary.radius[o])
-                a = n0 * u0 + n1 * u1 + n2 * u2 + lift / dt
+                    n, lift = round_contact(s, r, row(boundary.span, o), boundary.radius[o])
+                a = dot(n, u) + lift / dt
                 contacts.contact_id[i], contacts.mode[i] = o + 1, SLIDES
-                contacts.normal[i, 0], contacts.normal[i, 1], contacts.normal[i, 2] = n0, n1, n2
-                contacts.direction[i, 0], contacts.direction[i, 1], contacts.direction[i, 2] = n0, n1, n2
-                contacts.v_target[i, 0], contacts.v_target[i, 1], contacts.v_target[i, 2] = a * n0, a * n1, a * n2
+                put(contacts.normal, i, n)
+                put(contacts.direction, i, n)
+                put(contacts.v_target, i, times(a, n))
 
 
 @njit_exposed
@@ -120,12 +117,8 @@ def release_pulled(model, nodes, contacts, boundary, push):
         i = contacts.active[k]
         if contacts.mode[i] == FREE or contacts.mode[i] == ON_EDGE:
             continue
-        n0, n1, n2 = contacts.normal[i, 0], contacts.normal[i, 1], contacts.normal[i, 2]
-        u0, u1, u2 = pushed_velocity(model, nodes, boundary, push, i)
-        if (
-            contacts.v_target[i, 0] * n0 + contacts.v_target[i, 1] * n1 + contacts.v_target[i, 2] * n2
-            < u0 * n0 + u1 * n1 + u2 * n2
-        ):
+        n, u = row(contacts.normal, i), pushed_velocity(model, nodes, boundary, push, i)
+        if dot(row(contacts.v_target, i), n) < dot(u, n):
             # The next pass checks a released node again, however the pressure changes.
             contacts.contact_id[i], contacts.mode[i], contacts.predicted_gap[i] = 0, FREE, 0.0
             changes += 1
@@ -135,12 +128,10 @@ def release_pulled(model, nodes, contacts, boundary, push):
 @njit_inlined
 def enters(model, nodes, boundary, step, push, i):
     """Whether the free node i would end the step in an obstacle (eq. 3.7)."""
-    dt = boundary.dt
-    u0, u1, u2 = pushed_velocity(model, nodes, boundary, push, i)
-    y0, y1, y2 = nodes.x[i, 0] + dt * u0, nodes.x[i, 1] + dt * u1, nodes.x[i, 2] + dt * u2
-    for o in range(boundary.radius.shape[0]):
-        p0, p1, p2 = boundary.position[step, o, 0], boundary.position[step, o, 1], boundary.position[step, o, 2]
-        if gap_and_normal(boundary, o, y0 - p0, y1 - p1, y2 - p2)[0] < 0.0:
+    y = plus(row(nodes.x, i), times(boundary.dt, pushed_velocity(model, nodes, boundary, push, i)))
+    place = boundary.position[step]
+    for o in range(boundary.radius.shape[0]):  # noqa: SIM110 — numba compiles no generators
+        if gap_and_normal(boundary, o, minus(y, row(place, o)))[0] < 0.0:
             return True
     return False
 

@@ -9,6 +9,7 @@ import math
 from massspring.kernels.contact.node_contact import axis_share, round_gap
 from massspring.kernels.jit.decorators import njit_inlined
 from massspring.kernels.jit.flat import flat
+from massspring.kernels.jit.vec3 import dot, minus, over, plus, row, times
 
 
 @njit_inlined
@@ -22,7 +23,7 @@ def predicted_gaps_into(model, nodes, contacts, boundary, step, push):
     direction, inverse_mass = flat(push.direction, 0, n), flat(model.inverse_mass, 0, n)
     course = x, v_star, direction, inverse_mass, real(boundary.dt), real(boundary.dt * push.factor)
     predicted_gap = flat(contacts.predicted_gap, 0, n)
-    for i in range(predicted_gap.shape[0]):
+    for i in range(n):
         predicted_gap[i] = math.inf
     for o in range(boundary.radius.shape[0]):
         place, span, radius = boundary.position[step, o], boundary.span[o], real(boundary.radius[o])
@@ -51,48 +52,42 @@ def way_from(p, course, i):
 def plane_gap(course, predicted_gap, p, n):
     """n·(y − p) [m]."""
     for i in range(predicted_gap.shape[0]):
-        r0, r1, r2 = way_from(p, course, i)
-        predicted_gap[i] = min(predicted_gap[i], n[0] * r0 + n[1] * r1 + n[2] * r2)
+        predicted_gap[i] = min(predicted_gap[i], dot(n, way_from(p, course, i)))
 
 
 @njit_inlined
 def sphere_gap(course, predicted_gap, c, radius):
     """|y − c| − R [m]."""
     for i in range(predicted_gap.shape[0]):
-        r0, r1, r2 = way_from(c, course, i)
-        predicted_gap[i] = min(predicted_gap[i], math.sqrt(r0 * r0 + r1 * r1 + r2 * r2) - radius)
+        r = way_from(c, course, i)
+        predicted_gap[i] = min(predicted_gap[i], math.sqrt(dot(r, r)) - radius)
 
 
 @njit_inlined
 def capsule_gap(course, predicted_gap, p, a, radius):
     """Distance of y to the axis p … p + a less R [m]."""
     for i in range(predicted_gap.shape[0]):
-        r0, r1, r2 = way_from(p, course, i)
-        predicted_gap[i] = min(predicted_gap[i], round_gap(r0, r1, r2, a[0], a[1], a[2], radius))
+        predicted_gap[i] = min(predicted_gap[i], round_gap(way_from(p, course, i), a, radius))
 
 
 @njit_inlined
 def pushed_velocity(model, nodes, boundary, push, i):
     """u = v* + dt W f of node i [m/s], with the push on volumes as force f (eq. 3.7)."""
-    w, direction = boundary.dt * push.factor * model.inverse_mass[i], push.direction
-    u0 = nodes.v_star[i, 0] + w * direction[i, 0]
-    u1 = nodes.v_star[i, 1] + w * direction[i, 1]
-    u2 = nodes.v_star[i, 2] + w * direction[i, 2]
-    return u0, u1, u2
+    w = boundary.dt * push.factor * model.inverse_mass[i]
+    return plus(row(nodes.v_star, i), times(w, row(push.direction, i)))
 
 
 @njit_inlined
-def gap_and_normal(boundary, o, r0, r1, r2):
+def gap_and_normal(boundary, o, r):
     """Distance [m] of r to obstacle o, negative inside, and its normal there; r is relative to the position of the
     obstacle.
 
     On the axis of a sphere or capsule the normal is NaN.
     """
     if boundary.is_plane[o]:
-        n0, n1, n2 = boundary.plane_normal[o, 0], boundary.plane_normal[o, 1], boundary.plane_normal[o, 2]
-        return n0 * r0 + n1 * r1 + n2 * r2, n0, n1, n2
-    a0, a1, a2 = boundary.span[o, 0], boundary.span[o, 1], boundary.span[o, 2]
-    share = axis_share(r0, r1, r2, a0, a1, a2)
-    r0, r1, r2 = r0 - share * a0, r1 - share * a1, r2 - share * a2
-    distance = math.sqrt(r0 * r0 + r1 * r1 + r2 * r2)
-    return distance - boundary.radius[o], r0 / distance, r1 / distance, r2 / distance
+        n = row(boundary.plane_normal, o)
+        return dot(n, r), n
+    a = row(boundary.span, o)
+    r = minus(r, times(axis_share(r, a), a))
+    distance = math.sqrt(dot(r, r))
+    return distance - boundary.radius[o], over(r, distance)

@@ -7,6 +7,7 @@ import numpy as np
 
 from massspring.kernels.jit.by_address import by_address
 from massspring.kernels.jit.decorators import compiled, njit_inlined, njit_lean
+from massspring.kernels.jit.vec3 import add_to, cross, dot, plus, put, row, times
 
 FLAT = 1e-20
 """Share of its square at rest below which ∂J/∂x counts as zero."""
@@ -44,31 +45,24 @@ class Places(NamedTuple):
 @njit_inlined
 def deformation(elements, x, e, q):
     """F_q = Σ_a x_a ⊗ ∇N_a, row by row, nine numbers (eq. 8.8)."""
-    node, gradient = elements.node, elements.gradient
-    f00, f01, f02, f10, f11, f12, f20, f21, f22 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    node, gradient = elements.node, elements.gradient[e, q]
+    f = g = h = (0.0, 0.0, 0.0)
     for a in range(node.shape[1]):
-        i = node[e, a]
-        g0, g1, g2 = gradient[e, q, a, 0], gradient[e, q, a, 1], gradient[e, q, a, 2]
-        f00, f01, f02 = f00 + x[i, 0] * g0, f01 + x[i, 0] * g1, f02 + x[i, 0] * g2
-        f10, f11, f12 = f10 + x[i, 1] * g0, f11 + x[i, 1] * g1, f12 + x[i, 1] * g2
-        f20, f21, f22 = f20 + x[i, 2] * g0, f21 + x[i, 2] * g1, f22 + x[i, 2] * g2
-    return f00, f01, f02, f10, f11, f12, f20, f21, f22
+        p, slope = row(x, node[e, a]), row(gradient, a)
+        f, g, h = plus(f, times(p[0], slope)), plus(g, times(p[1], slope)), plus(h, times(p[2], slope))
+    return f + g + h
 
 
 @njit_inlined
 def open_element_point(elements, f, e, q):
     """D_a = w cof F ∇N_a into `area` (eq. 8.10). Returns J, and Σ |D_a|² over its value at rest."""
-    f00, f01, f02, f10, f11, f12, f20, f21, f22 = f
-    c00, c01, c02 = f11 * f22 - f12 * f21, f12 * f20 - f10 * f22, f10 * f21 - f11 * f20
-    c10, c11, c12 = f21 * f02 - f22 * f01, f22 * f00 - f20 * f02, f20 * f01 - f21 * f00
-    c20, c21, c22 = f01 * f12 - f02 * f11, f02 * f10 - f00 * f12, f00 * f11 - f01 * f10
-    gradient, area, w, now, rest = elements.gradient, elements.area, elements.weight[e, q], 0.0, 0.0
-    for a in range(area.shape[0]):
-        g0, g1, g2 = gradient[e, q, a, 0], gradient[e, q, a, 1], gradient[e, q, a, 2]
-        d0, d1, d2 = c00 * g0 + c01 * g1 + c02 * g2, c10 * g0 + c11 * g1 + c12 * g2, c20 * g0 + c21 * g1 + c22 * g2
-        area[a, 0], area[a, 1], area[a, 2] = w * d0, w * d1, w * d2
-        now, rest = now + d0 * d0 + d1 * d1 + d2 * d2, rest + g0 * g0 + g1 * g1 + g2 * g2
-    return f00 * c00 + f01 * c01 + f02 * c02, now / rest
+    c, gradient, w, now, rest = cofactors(f), elements.gradient[e, q], elements.weight[e, q], 0.0, 0.0
+    for a in range(gradient.shape[0]):
+        g = row(gradient, a)
+        d = matrix_times(c, g)
+        put(elements.area, a, times(w, d))
+        now, rest = now + d[0] * d[0] + d[1] * d[1] + d[2] * d[2], rest + g[0] * g[0] + g[1] * g[1] + g[2] * g[2]
+    return dot(f, c), now / rest
 
 
 @njit_inlined
@@ -85,9 +79,8 @@ def element_energy(elements, x):
     total = 0.0
     for e in range(elements.node.shape[0]):
         for q in range(elements.weight.shape[1]):
-            f00, f01, f02, f10, f11, f12, f20, f21, f22 = deformation(elements, x, e, q)
-            c0, c1, c2 = f11 * f22 - f12 * f21, f12 * f20 - f10 * f22, f10 * f21 - f11 * f20
-            grown = f00 * c0 + f01 * c1 + f02 * c2 - 1.0
+            f = deformation(elements, x, e, q)
+            grown = dot(f, cross(f[3:6], f[6:9])) - 1.0
             missing = grown + 1.0 - elements.target_ratio[e, q]
             density = -mu * grown + 0.5 * local * grown * grown + 0.5 * bulk * missing * missing
             total += elements.weight[e, q] * density
@@ -98,17 +91,14 @@ def element_energy(elements, x):
 def element_forces_into(elements, x, force):
     """f_a = Σ_q p_q D_qa [N], (n, 3) (eq. 13.4). Returns whether the volume of a point has no gradient."""
     force[:] = 0.0
-    node, area, idle = elements.node, elements.area, False
+    node, idle = elements.node, False
     for e in range(node.shape[0]):
         for q in range(elements.weight.shape[1]):
             ratio, steep = open_element_point(elements, deformation(elements, x, e, q), e, q)
             pressure = point_pressure(elements, ratio, e, q)
             idle |= steep < FLAT
             for a in range(node.shape[1]):
-                i = node[e, a]
-                force[i, 0] += pressure * area[a, 0]
-                force[i, 1] += pressure * area[a, 1]
-                force[i, 2] += pressure * area[a, 2]
+                add_to(force, node[e, a], times(pressure, row(elements.area, a)))
     return idle
 
 
@@ -116,27 +106,16 @@ def element_forces_into(elements, x, force):
 def add_point_stiffness(elements, f, stiff, turning, place):
     """Adds `stiff` D_a ⊗ D_b − `turning` ∂²J/∂x_a∂x_b of a point (e, q) to `block`, for a ≤ b (eq. 8.14, 13.5)."""
     e, q = place
-    gradient, area, block = elements.gradient, elements.area, elements.block
-    f00, f01, f02, f10, f11, f12, f20, f21, f22 = f
+    gradient, area, block = elements.gradient[e, q], elements.area, elements.block
     for a in range(area.shape[0]):
-        a0, a1, a2 = stiff * area[a, 0], stiff * area[a, 1], stiff * area[a, 2]
-        g0, g1, g2 = gradient[e, q, a, 0], gradient[e, q, a, 1], gradient[e, q, a, 2]
+        own, g = times(stiff, row(area, a)), row(gradient, a)
         for b in range(a, area.shape[0]):
-            b0, b1, b2 = area[b, 0], area[b, 1], area[b, 2]
-            h0, h1, h2 = gradient[e, q, b, 0], gradient[e, q, b, 1], gradient[e, q, b, 2]
-            t0, t1, t2 = g1 * h2 - g2 * h1, g2 * h0 - g0 * h2, g0 * h1 - g1 * h0
-            v0 = turning * (f00 * t0 + f01 * t1 + f02 * t2)
-            v1 = turning * (f10 * t0 + f11 * t1 + f12 * t2)
-            v2 = turning * (f20 * t0 + f21 * t1 + f22 * t2)
-            block[a, b, 0, 0] += a0 * b0
-            block[a, b, 0, 1] += a0 * b1 - v2
-            block[a, b, 0, 2] += a0 * b2 + v1
-            block[a, b, 1, 0] += a1 * b0 + v2
-            block[a, b, 1, 1] += a1 * b1
-            block[a, b, 1, 2] += a1 * b2 - v0
-            block[a, b, 2, 0] += a2 * b0 - v1
-            block[a, b, 2, 1] += a2 * b1 + v0
-            block[a, b, 2, 2] += a2 * b2
+            other = row(area, b)
+            v0, v1, v2 = times(turning, matrix_times(f, cross(g, row(gradient, b))))
+            part = block[a, b]
+            add_to(part, 0, plus(times(own[0], other), (0.0, -v2, v1)))
+            add_to(part, 1, plus(times(own[1], other), (v2, 0.0, -v0)))
+            add_to(part, 2, plus(times(own[2], other), (-v1, v0, 0.0)))
 
 
 @njit_inlined
@@ -168,3 +147,20 @@ def add_element_stiffness(elements, places, x, factor, exact, data):
             turning = weight * point_pressure(elements, ratio, e, q) if exact else 0.0
             add_point_stiffness(elements, f, (bulk + local) / weight, turning, (e, q))
         scatter(elements, places, e, factor, data)
+
+
+@njit_inlined
+def matrix_times(m, a):
+    """M a of nine numbers, row by row, and three."""
+    return (
+        m[0] * a[0] + m[1] * a[1] + m[2] * a[2],
+        m[3] * a[0] + m[4] * a[1] + m[5] * a[2],
+        m[6] * a[0] + m[7] * a[1] + m[8] * a[2],
+    )
+
+
+@njit_inlined
+def cofactors(f):
+    """cof F, row by row, nine numbers; F·cof F = 3 det F."""
+    a, b, c = f[0:3], f[3:6], f[6:9]
+    return cross(b, c) + cross(c, a) + cross(a, b)

@@ -1,6 +1,7 @@
 """Triangle springs: a wall that stretches and shears like a thin sheet of tissue (Delingette 2008)."""
 
-from massspring.kernels.jit.decorators import njit_lean
+from massspring.kernels.jit.decorators import njit_inlined, njit_lean
+from massspring.kernels.jit.vec3 import add_to, dot, minus, row, times
 
 
 @njit_lean
@@ -10,27 +11,15 @@ def add_membrane_forces(x, membrane, force):
     Δ_a = |x_c − x_b|² − L_a² of the edge opposite node a. Zero at rest; internal: forces and moments sum to zero.
     """
     for t in range(membrane.triangles.shape[0]):
-        i, j, k = membrane.triangles[t, 0], membrane.triangles[t, 1], membrane.triangles[t, 2]
-        a0, a1, a2 = x[k, 0] - x[j, 0], x[k, 1] - x[j, 1], x[k, 2] - x[j, 2]
-        b0, b1, b2 = x[i, 0] - x[k, 0], x[i, 1] - x[k, 1], x[i, 2] - x[k, 2]
-        c0, c1, c2 = x[j, 0] - x[i, 0], x[j, 1] - x[i, 1], x[j, 2] - x[i, 2]
-        da = a0 * a0 + a1 * a1 + a2 * a2 - membrane.rest_square[t, 0]
-        db = b0 * b0 + b1 * b1 + b2 * b2 - membrane.rest_square[t, 1]
-        dc = c0 * c0 + c1 * c1 + c2 * c2 - membrane.rest_square[t, 2]
-        ka, kb, kc = membrane.stiffness[t, 0], membrane.stiffness[t, 1], membrane.stiffness[t, 2]
-        ca, cb, cc = membrane.coupling[t, 0], membrane.coupling[t, 1], membrane.coupling[t, 2]
-        ga = 2.0 * (ka * da + cb * dc + cc * db)
-        gb = 2.0 * (kb * db + cc * da + ca * dc)
-        gc = 2.0 * (kc * dc + ca * db + cb * da)
-        force[i, 0] += gc * c0 - gb * b0
-        force[i, 1] += gc * c1 - gb * b1
-        force[i, 2] += gc * c2 - gb * b2
-        force[j, 0] += ga * a0 - gc * c0
-        force[j, 1] += ga * a1 - gc * c1
-        force[j, 2] += ga * a2 - gc * c2
-        force[k, 0] += gb * b0 - ga * a0
-        force[k, 1] += gb * b1 - ga * a1
-        force[k, 2] += gb * b2 - ga * a2
+        (i, j, k), (a, b, c), (da, db, dc) = edges_of(x, membrane, t)
+        ka, kb, kc = row(membrane.stiffness, t)
+        ca, cb, cc = row(membrane.coupling, t)
+        pull_a = times(2.0 * (ka * da + cb * dc + cc * db), a)
+        pull_b = times(2.0 * (kb * db + cc * da + ca * dc), b)
+        pull_c = times(2.0 * (kc * dc + ca * db + cb * da), c)
+        add_to(force, i, minus(pull_c, pull_b))
+        add_to(force, j, minus(pull_a, pull_c))
+        add_to(force, k, minus(pull_b, pull_a))
 
 
 @njit_lean
@@ -38,16 +27,20 @@ def membrane_energy(x, membrane):
     """U = Σ_t Σ_a ½ k_a Δ_a² + c_a Δ_b Δ_c [J] (eq. 4.6)."""
     energy = 0.0
     for t in range(membrane.triangles.shape[0]):
+        _, _, grown = edges_of(x, membrane, t)
         for a in range(3):
             b, c = (a + 1) % 3, (a + 2) % 3
-            da, db, dc = 0.0, 0.0, 0.0
-            i, j, k = membrane.triangles[t, a], membrane.triangles[t, b], membrane.triangles[t, c]
-            for axis in range(3):
-                da += (x[k, axis] - x[j, axis]) ** 2
-                db += (x[i, axis] - x[k, axis]) ** 2
-                dc += (x[j, axis] - x[i, axis]) ** 2
-            da -= membrane.rest_square[t, a]
-            db -= membrane.rest_square[t, b]
-            dc -= membrane.rest_square[t, c]
-            energy += 0.5 * membrane.stiffness[t, a] * da * da + membrane.coupling[t, a] * db * dc
+            energy += (
+                0.5 * membrane.stiffness[t, a] * grown[a] * grown[a] + membrane.coupling[t, a] * grown[b] * grown[c]
+            )
     return energy
+
+
+@njit_inlined
+def edges_of(x, membrane, t):
+    """Nodes i, j, k of a triangle, its edges a, b, c opposite to them, and Δ of each edge [m²]."""
+    i, j, k = membrane.triangles[t, 0], membrane.triangles[t, 1], membrane.triangles[t, 2]
+    p, q, r = row(x, i), row(x, j), row(x, k)
+    a, b, c = minus(r, q), minus(p, r), minus(q, p)
+    grown = minus((dot(a, a), dot(b, b), dot(c, c)), row(membrane.rest_square, t))
+    return (i, j, k), (a, b, c), grown

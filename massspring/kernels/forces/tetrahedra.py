@@ -1,17 +1,20 @@
 """Volumes of tetrahedra, and their smallest ratio to the rest volumes."""
 
 from massspring.kernels.jit.decorators import compiled
+from massspring.kernels.jit.vec3 import minus, row, triple
 
 
 @compiled
 def tetrahedron_volumes_into(x, tetrahedra, volume):
     """V_t = (1/6) (x_b − x_a) · ((x_c − x_a) × (x_d − x_a)) [m³], (k,) (eq. 2.3). Negative: inverted."""
     for t in range(tetrahedra.shape[0]):
-        a, b, c, d = tetrahedra[t, 0], tetrahedra[t, 1], tetrahedra[t, 2], tetrahedra[t, 3]
-        b0, b1, b2 = x[b, 0] - x[a, 0], x[b, 1] - x[a, 1], x[b, 2] - x[a, 2]
-        c0, c1, c2 = x[c, 0] - x[a, 0], x[c, 1] - x[a, 1], x[c, 2] - x[a, 2]
-        d0, d1, d2 = x[d, 0] - x[a, 0], x[d, 1] - x[a, 1], x[d, 2] - x[a, 2]
-        volume[t] = (b0 * (c1 * d2 - c2 * d1) + b1 * (c2 * d0 - c0 * d2) + b2 * (c0 * d1 - c1 * d0)) / 6.0
+        o = row(x, tetrahedra[t, 0])
+        b, c, d = (
+            minus(row(x, tetrahedra[t, 1]), o),
+            minus(row(x, tetrahedra[t, 2]), o),
+            minus(row(x, tetrahedra[t, 3]), o),
+        )
+        volume[t] = triple(b, c, d) / 6.0
 
 
 @compiled

@@ -8,6 +8,7 @@ import numpy as np
 from massspring.kernels.forces.springs import SHORTEST
 from massspring.kernels.jit.by_address import by_address
 from massspring.kernels.jit.decorators import compiled, njit_exposed, njit_inlined
+from massspring.kernels.jit.vec3 import add_to, cross, dot, minus, over, plus, row, take_from, times
 
 
 @by_address
@@ -45,37 +46,23 @@ class Cells(NamedTuple):
 
 
 @njit_exposed
-def cell_slopes(x, a, b, c, d):
+def cell_slopes(x, nodes):
     """V_t [m³] and dV_t/dx of b, c, d [m²]: (1/6) (x_c − x_a) × (x_d − x_a) and its rotations (eq. 2.3, 10.11)."""
-    b0, b1, b2 = x[b, 0] - x[a, 0], x[b, 1] - x[a, 1], x[b, 2] - x[a, 2]
-    c0, c1, c2 = x[c, 0] - x[a, 0], x[c, 1] - x[a, 1], x[c, 2] - x[a, 2]
-    d0, d1, d2 = x[d, 0] - x[a, 0], x[d, 1] - x[a, 1], x[d, 2] - x[a, 2]
-    p0, p1, p2 = (c1 * d2 - c2 * d1) / 6.0, (c2 * d0 - c0 * d2) / 6.0, (c0 * d1 - c1 * d0) / 6.0
-    q0, q1, q2 = (d1 * b2 - d2 * b1) / 6.0, (d2 * b0 - d0 * b2) / 6.0, (d0 * b1 - d1 * b0) / 6.0
-    r0, r1, r2 = (b1 * c2 - b2 * c1) / 6.0, (b2 * c0 - b0 * c2) / 6.0, (b0 * c1 - b1 * c0) / 6.0
-    return b0 * p0 + b1 * p1 + b2 * p2, p0, p1, p2, q0, q1, q2, r0, r1, r2
+    o = row(x, nodes[0])
+    b, c, d = minus(row(x, nodes[1]), o), minus(row(x, nodes[2]), o), minus(row(x, nodes[3]), o)
+    p = over(cross(c, d), 6.0)
+    return dot(b, p), p, over(cross(d, b), 6.0), over(cross(b, c), 6.0)
 
 
 @njit_inlined
 def add_four(out, nodes, f, p, q, r):
     """Adds f p, f q, f r to the last three of four nodes and minus their sum to the first, so that the net force is
     0."""
-    a, b, c, d = nodes
-    p0, p1, p2 = f * p[0], f * p[1], f * p[2]
-    q0, q1, q2 = f * q[0], f * q[1], f * q[2]
-    r0, r1, r2 = f * r[0], f * r[1], f * r[2]
-    out[a, 0] -= p0 + q0 + r0
-    out[a, 1] -= p1 + q1 + r1
-    out[a, 2] -= p2 + q2 + r2
-    out[b, 0] += p0
-    out[b, 1] += p1
-    out[b, 2] += p2
-    out[c, 0] += q0
-    out[c, 1] += q1
-    out[c, 2] += q2
-    out[d, 0] += r0
-    out[d, 1] += r1
-    out[d, 2] += r2
+    p, q, r = times(f, p), times(f, q), times(f, r)
+    take_from(out, nodes[0], plus(plus(p, q), r))
+    add_to(out, nodes[1], p)
+    add_to(out, nodes[2], q)
+    add_to(out, nodes[3], r)
 
 
 @compiled
@@ -90,23 +77,23 @@ def add_volume_forces(x, cells, bulk_modulus, force):
 
     Returns whether a cell has collapsed so that its volume has no gradient.
     """
-    tetrahedra, filling, idle = cells.tetrahedra, cells.filling[0], False
-    for t in range(tetrahedra.shape[0]):
-        a, b, c, d = tetrahedra[t, 0], tetrahedra[t, 1], tetrahedra[t, 2], tetrahedra[t, 3]
-        volume, p0, p1, p2, q0, q1, q2, r0, r1, r2 = cell_slopes(x, a, b, c, d)
+    filling, idle = cells.filling[0], False
+    for t in range(cells.tetrahedra.shape[0]):
+        nodes = four(cells.tetrahedra, t)
+        volume, p, q, r = cell_slopes(x, nodes)
         pressure = bulk_modulus * (filling - volume / cells.rest_volume[t])
         cells.pressure[t] = pressure
         if volume == 0.0:
-            idle |= p0 == p1 == p2 == q0 == q1 == q2 == r0 == r1 == r2 == 0.0
-        add_four(force, (a, b, c, d), pressure, (p0, p1, p2), (q0, q1, q2), (r0, r1, r2))
+            idle |= p == q == r == (0.0, 0.0, 0.0)
+        add_four(force, nodes, pressure, p, q, r)
     return idle
 
 
 @njit_inlined
-def unit(r0, r1, r2):
+def unit(r):
     """(|r|, r/|r|); a node on the barycentre has no direction."""
-    length = max(math.sqrt(r0 * r0 + r1 * r1 + r2 * r2), SHORTEST)
-    return length, r0 / length, r1 / length, r2 / length
+    length = max(math.sqrt(dot(r, r)), SHORTEST)
+    return length, over(r, length)
 
 
 @compiled
@@ -115,26 +102,22 @@ def add_barycentre_forces(x, cells, bulk_modulus, force):
 
     Without the mean, as published, an irregular cell would exert a net force on itself.
     """
-    tetrahedra, wider = cells.tetrahedra, np.cbrt(cells.filling[0])
-    for t in range(tetrahedra.shape[0]):
-        a, b, c, d = tetrahedra[t, 0], tetrahedra[t, 1], tetrahedra[t, 2], tetrahedra[t, 3]
-        b0, b1, b2 = x[b, 0] - x[a, 0], x[b, 1] - x[a, 1], x[b, 2] - x[a, 2]
-        c0, c1, c2 = x[c, 0] - x[a, 0], x[c, 1] - x[a, 1], x[c, 2] - x[a, 2]
-        d0, d1, d2 = x[d, 0] - x[a, 0], x[d, 1] - x[a, 1], x[d, 2] - x[a, 2]
-        m0, m1, m2 = 0.25 * (b0 + c0 + d0), 0.25 * (b1 + c1 + d1), 0.25 * (b2 + c2 + d2)
-        la, a0, a1, a2 = unit(-m0, -m1, -m2)
-        lb, b0, b1, b2 = unit(b0 - m0, b1 - m1, b2 - m2)
-        lc, c0, c1, c2 = unit(c0 - m0, c1 - m1, c2 - m2)
-        ld, d0, d1, d2 = unit(d0 - m0, d1 - m1, d2 - m2)
+    wider = np.cbrt(cells.filling[0])
+    for t in range(cells.tetrahedra.shape[0]):
+        nodes = four(cells.tetrahedra, t)
+        o = row(x, nodes[0])
+        b, c, d = minus(row(x, nodes[1]), o), minus(row(x, nodes[2]), o), minus(row(x, nodes[3]), o)
+        m = times(0.25, plus(plus(b, c), d))
+        la, a = unit(times(-1.0, m))
+        lb, b = unit(minus(b, m))
+        lc, c = unit(minus(c, m))
+        ld, d = unit(minus(d, m))
         reach, volume = cells.rest_reach[t], cells.rest_volume[t]
         stretch = la + lb + lc + ld - wider * reach
         push = -9.0 * bulk_modulus * volume * stretch / (reach * reach)
         cells.pressure[t] = push * reach / (3.0 * volume)
-        m0, m1, m2 = 0.25 * (a0 + b0 + c0 + d0), 0.25 * (a1 + b1 + c1 + d1), 0.25 * (a2 + b2 + c2 + d2)
-        b0, b1, b2 = b0 - m0, b1 - m1, b2 - m2
-        c0, c1, c2 = c0 - m0, c1 - m1, c2 - m2
-        d0, d1, d2 = d0 - m0, d1 - m1, d2 - m2
-        add_four(force, (a, b, c, d), push, (b0, b1, b2), (c0, c1, c2), (d0, d1, d2))
+        m = times(0.25, plus(plus(plus(a, b), c), d))
+        add_four(force, nodes, push, minus(b, m), minus(c, m), minus(d, m))
 
 
 @compiled
@@ -145,3 +128,9 @@ def mean_pressure(cells):
         total += cells.rest_volume[t] * cells.pressure[t]
         volume += cells.rest_volume[t]
     return total / volume
+
+
+@njit_inlined
+def four(tetrahedra, t):
+    """The nodes of tetrahedron t."""
+    return tetrahedra[t, 0], tetrahedra[t, 1], tetrahedra[t, 2], tetrahedra[t, 3]

@@ -36,7 +36,7 @@ def total(tile, at):
 
 
 @njit_inlined
-def put(tile, block, slices, s, x):
+def put_slice(tile, block, slices, s, x):
     """Copies a block of the tile to x_i of the nodes, for the lanes in use."""
     for lane in range(LANES):
         at = THERE + 3 * lane

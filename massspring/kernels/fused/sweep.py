@@ -5,9 +5,10 @@ same work.
 """
 
 from massspring.kernels.forces.springs import SHORTEST
-from massspring.kernels.fused.chunk import AREA, FORCE, HERE, LANES, RESULT, SHARE, SPEED, SUMS, put, take, total
+from massspring.kernels.fused.chunk import AREA, FORCE, HERE, LANES, RESULT, SHARE, SPEED, SUMS, put_slice, take, total
 from massspring.kernels.fused.long_rows import add_walls, join_pieces
 from massspring.kernels.jit.decorators import njit_inlined
+from massspring.kernels.jit.vec3 import cross, dot, minus, plus, times
 from massspring.kernels.jit.vectors import at_least, gather, lanes_of, load, root, save, spread
 
 
@@ -70,7 +71,7 @@ def pulled_by(force, slices, row, lane, shortest, d):
     stiffness = load(slices.stiffness, slices.stiffness_row[row], lane)
     length = at_least(root(dot(d, d)), shortest)
     c = stiffness - stiffness * (load(slices.rest_length, row, lane) / length)
-    return force[0] + c * d[0], force[1] + c * d[1], force[2] + c * d[2]
+    return plus(force, times(c, d))
 
 
 @njit_inlined
@@ -79,33 +80,8 @@ def pulled_without_length(force, padded, slices, rows, lane, here):
     last bit."""
     for row in range(rows[0], rows[1]):
         d = minus(gather(padded, slices.neighbour, row, lane), here)
-        k = load(slices.stiffness, slices.stiffness_row[row], lane)
-        force = force[0] + k * d[0], force[1] + k * d[1], force[2] + k * d[2]
+        force = plus(force, times(load(slices.stiffness, slices.stiffness_row[row], lane), d))
     return force
-
-
-@njit_inlined
-def minus(a, b):
-    """a − b."""
-    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
-
-
-@njit_inlined
-def plus(a, b):
-    """a + b."""
-    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
-
-
-@njit_inlined
-def dot(a, b):
-    """a · b."""
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-@njit_inlined
-def cross(a, b):
-    """a × b."""
-    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
 @njit_inlined
@@ -175,10 +151,10 @@ def pass_slices(nodes, work, boundary, slices, keeps):
             continue
         keep_held(slices, s, nodes.force, tile)
         predict_slice(nodes, slices, s, dt, keep, a, tile)
-        put(tile, HERE, slices, s, v_star)
+        put_slice(tile, HERE, slices, s, v_star)
         # Empty lanes have springs of no stiffness and no ring: they add zeros.
         if keeps:
-            put(tile, AREA, slices, s, gradient)
+            put_slice(tile, AREA, slices, s, gradient)
             sums[s, 1], sums[s, 2] = total(tile, SUMS), total(tile, SUMS + LANES)
 
 

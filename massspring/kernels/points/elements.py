@@ -4,9 +4,9 @@ massspring.kernels.points.slopes defines W_i, A_i and the numbers n and o of a p
 """
 
 from massspring.kernels.forces.volume import volume_gradient_into
-from massspring.kernels.fused.sweep import cross, dot
 from massspring.kernels.jit.decorators import njit_inlined, njit_lean
 from massspring.kernels.jit.flat import flat
+from massspring.kernels.jit.vec3 import cross, dot, plus, put, row, times
 from massspring.kernels.jit.vectors import lanes_of, load, save, spread
 from massspring.kernels.points.arrays import AREAS, BLOCK, CORNERS, POINTS, ROWS, SUMS
 from massspring.kernels.points.slopes import (
@@ -20,7 +20,6 @@ from massspring.kernels.points.slopes import (
     open_block,
     save_three,
     slopes,
-    times,
 )
 
 
@@ -30,7 +29,7 @@ def open_point(rows, block, q, between, lane):
     w_q J_q into the tile."""
     w1, w2, w3 = slopes(rows, between, lane)
     part, point = spread(1.0 / 24.0, rows.tile), block * POINTS + q
-    a1, a2, a3 = times(cross(w2, w3), part), times(cross(w3, w1), part), times(cross(w1, w2), part)
+    a1, a2, a3 = times(part, cross(w2, w3)), times(part, cross(w3, w1)), times(part, cross(w1, w2))
     now = dot(w1, a1)
     stretch, tile = flat(rows.stretch, point, point + 1), flat(rows.tile, SUMS + q, SUMS + q + 1)
     ratio = now * load(rows.per_weight, point, lane)
@@ -152,15 +151,13 @@ def push_elements(rows, p, stretched):
 @njit_inlined
 def push_of(rows, force, p, i):
     """The force on node i from the elements around it and from the closed surface [N]."""
-    f0, f1, f2 = 0.0, 0.0, 0.0
+    f = (0.0, 0.0, 0.0)
     for k in range(rows.node_start[i], rows.node_start[i + 1]):
         at = rows.node_entry[k]
-        f0, f1, f2 = f0 + force[at], f1 + force[at + BLOCK], f2 + force[at + 2 * BLOCK]
+        f = plus(f, (force[at], force[at + BLOCK], force[at + 2 * BLOCK]))
     if rows.closed_nodes.shape[0] > 0:
-        inside = p[p.shape[0] - 1]
-        f0, f1 = f0 + inside * rows.closed_gradient[i, 0], f1 + inside * rows.closed_gradient[i, 1]
-        f2 = f2 + inside * rows.closed_gradient[i, 2]
-    return f0, f1, f2
+        f = plus(f, times(p[p.shape[0] - 1], row(rows.closed_gradient, i)))
+    return f
 
 
 @njit_lean
@@ -169,7 +166,7 @@ def push_into(rows, p):
     push_elements(rows, p, True)
     force = flat(rows.element_push, 0, rows.element_push.shape[0])
     for i in range(rows.push.shape[0]):
-        rows.push[i, 0], rows.push[i, 1], rows.push[i, 2] = push_of(rows, force, p, i)
+        put(rows.push, i, push_of(rows, force, p, i))
 
 
 @njit_inlined

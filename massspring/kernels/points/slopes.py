@@ -7,6 +7,7 @@ with W_i = ∂x/∂b_i − ∂x/∂b_0, so w_q J_q = det W / 24 and w_q cof F_q 
 
 from massspring.kernels.jit.decorators import njit_inlined
 from massspring.kernels.jit.flat import flat
+from massspring.kernels.jit.vec3 import minus, plus, times
 from massspring.kernels.jit.vectors import gather, lanes_of, load, save, spread
 from massspring.kernels.points.arrays import BLOCK, NODES, ROWS
 
@@ -41,12 +42,6 @@ def load_three(table, row, lane):
 
 
 @njit_inlined
-def times(vector, factor):
-    """The components times a factor."""
-    return vector[0] * factor, vector[1] * factor, vector[2] * factor
-
-
-@njit_inlined
 def open_block(rows, lane):
     """B_i = (4 o − 1)(x_i − x_0) + 4 o Σ_j (x_ij − x_0j), from the tile's vector x at corners and mid-sides: the part
     of ∂x/∂b_i − ∂x/∂b_0 common to all points (eq. 8.9)."""
@@ -67,7 +62,7 @@ def slope(rows, side, near, first, lane):
     """W_i = ∂x/∂b_i − ∂x/∂b_0 = B_i + 4 (n − o)(x_iq − x_0q) at point q; `near` and `first` are the nodes iq and 0q."""
     nearer, base = spread(4.0 * (rows.own - rows.other), rows.tile), load_three(rows.tile, ROWS + 3 * side, lane)
     to, of = load_three(rows.tile, 3 * near, lane), load_three(rows.tile, 3 * first, lane)
-    return base[0] + nearer * (to[0] - of[0]), base[1] + nearer * (to[1] - of[1]), base[2] + nearer * (to[2] - of[2])
+    return plus(base, times(nearer, minus(to, of)))
 
 
 @njit_inlined

@@ -5,26 +5,27 @@ import math
 
 from massspring.kernels.constraint.ldl_solve import respond_into
 from massspring.kernels.constraint.one_volume import limited_error, surely_short
-from massspring.kernels.constraint.schur import along, beyond, dot
+from massspring.kernels.constraint.schur import along, beyond, inner_product
+from massspring.kernels.contact.constrained_motion import after_contact, allowed
 from massspring.kernels.contact.face_pairs import part_faces
-from massspring.kernels.contact.modes import FREE
-from massspring.kernels.contact.node_contact import allowed_part
 from massspring.kernels.jit.decorators import compiled, njit_exposed, njit_inlined, njit_lean, njit_reassociated
 from massspring.kernels.jit.flat import flat
+from massspring.kernels.jit.vec3 import add_to, plus, put, row, times
 from massspring.kernels.points.elements import push_elements, push_of, times_into
 
 
 @compiled
 def weigh_into(model, nodes, rows, boundary):
     """Adds gravity on the mass that `mass` lacks: to v* of free nodes, and to the force on held ones."""
+    gravity = boundary.gravity
     for i in range(rows.heavier.shape[0]):
         push = boundary.dt * model.inverse_mass[i] * rows.heavier[i]
         for axis in range(3):
-            nodes.v_star[i, axis] += push * boundary.gravity[axis]
+            nodes.v_star[i, axis] += push * gravity[axis]
     for h in range(model.held_nodes.shape[0]):
         i = model.held_nodes[h]
         for axis in range(3):
-            nodes.force[i, axis] += rows.heavier[i] * boundary.gravity[axis]
+            nodes.force[i, axis] += rows.heavier[i] * gravity[axis]
 
 
 @njit_inlined
@@ -32,8 +33,7 @@ def respond(model, force, implicit, moved):
     """W f [m/s²] into `moved` (n, 3): node by node, or with the inverse of the matrix of implicit springs."""
     if implicit is None:
         for i in range(force.shape[0]):
-            w = model.inverse_mass[i]
-            moved[i, 0], moved[i, 1], moved[i, 2] = w * force[i, 0], w * force[i, 1], w * force[i, 2]
+            put(moved, i, times(model.inverse_mass[i], row(force, i)))
     else:
         respond_into(implicit.factor, force, moved)
 
@@ -44,13 +44,7 @@ def pushed_velocity_into(model, nodes, contacts, rows, implicit, dt):
     u, moved = rows.node_vector, rows.moved
     respond(model, rows.push, implicit, moved)
     for i in range(moved.shape[0]):
-        u0, u1 = nodes.v_star[i, 0] + dt * moved[i, 0], nodes.v_star[i, 1] + dt * moved[i, 1]
-        u2 = nodes.v_star[i, 2] + dt * moved[i, 2]
-        if contacts.mode[i] > FREE:
-            d0, d1, d2 = contacts.direction[i, 0], contacts.direction[i, 1], contacts.direction[i, 2]
-            u0, u1, u2 = allowed_part(contacts.mode[i], d0, d1, d2, u0, u1, u2)
-            u0, u1, u2 = u0 + contacts.v_target[i, 0], u1 + contacts.v_target[i, 1], u2 + contacts.v_target[i, 2]
-        u[i, 0], u[i, 1], u[i, 2] = u0, u1, u2
+        put(u, i, after_contact(contacts, i, plus(row(nodes.v_star, i), times(dt, row(moved, i)))))
 
 
 @njit_lean
@@ -86,14 +80,10 @@ def apply_schur(frame, rows, implicit, p, product, pairs=None):
     force, u, contacts = flat(rows.element_push, 0, rows.element_push.shape[0]), rows.node_vector, frame.contacts
     field, moved = rows.field, rows.moved
     for i in range(field.shape[0]):
-        field[i, 0], field[i, 1], field[i, 2] = push_of(rows, force, p, i)
+        put(field, i, push_of(rows, force, p, i))
     respond(frame.model, field, implicit, moved)
     for i in range(moved.shape[0]):
-        u0, u1, u2 = moved[i, 0], moved[i, 1], moved[i, 2]
-        if contacts.mode[i] > FREE:
-            d0, d1, d2 = contacts.direction[i, 0], contacts.direction[i, 1], contacts.direction[i, 2]
-            u0, u1, u2 = allowed_part(contacts.mode[i], d0, d1, d2, u0, u1, u2)
-        u[i, 0], u[i, 1], u[i, 2] = u0, u1, u2
+        put(u, i, allowed(contacts, i, row(moved, i)))
     part_faces(pairs, contacts, frame.model.inverse_mass, u, 1.0, False)
     times_into(rows, u, product)
 
@@ -104,12 +94,10 @@ def add_response(model, nodes, rows, implicit, dt):
     3.6)."""
     respond(model, rows.field, implicit, rows.moved)
     for i in range(rows.moved.shape[0]):
-        for axis in range(3):
-            nodes.v_star[i, axis] += dt * rows.moved[i, axis]
+        add_to(nodes.v_star, i, times(dt, row(rows.moved, i)))
     for h in range(model.held_nodes.shape[0]):
         i = model.held_nodes[h]
-        for axis in range(3):
-            nodes.force[i, axis] += rows.field[i, axis]
+        add_to(nodes.force, i, row(rows.field, i))
 
 
 @njit_reassociated
@@ -152,7 +140,7 @@ def solve_iteratively(frame, rows, implicit, most, pairs=None):
         for r in range(search.shape[0]):
             search[r] = image[r] + keep * search[r]
         apply_schur(frame, rows, implicit, search, image, pairs)
-        curvature = dot(search, image)
+        curvature = inner_product(search, image)
         if not curvature > 0.0:
             break
         along(search, image, rho / curvature, rows.lam, residual)

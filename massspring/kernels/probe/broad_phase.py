@@ -6,6 +6,7 @@ from massspring.kernels.contact.bookkeeping import settled
 from massspring.kernels.contact.modes import FREE
 from massspring.kernels.jit.decorators import njit_ignoring_nan, njit_lean
 from massspring.kernels.jit.flat import flat
+from massspring.kernels.jit.vec3 import dot, plus, row, times
 from massspring.kernels.probe.arrays import COMPARED
 
 TRIANGLE_BLOCK = 8
@@ -32,28 +33,28 @@ def fastest_free(v_star, direction, inverse_mass, impulse):
 @njit_lean
 def fastest_node(model, nodes, contacts, push, dt):
     """Upper bound on |v⁺_i| [m/s] over all nodes, without thin probes (eq. 3.5)."""
-    n, mode, real = model.inverse_mass.shape[0], contacts.mode, nodes.x.dtype.type
+    n, real = model.inverse_mass.shape[0], nodes.x.dtype.type
     v_star, direction = flat(nodes.v_star, 0, n), flat(push.direction, 0, n)
     weight = flat(model.inverse_mass, 0, n)
     fastest = float(fastest_free(v_star, direction, weight, real(dt * push.factor)))
     for k in range(contacts.active_count[0]):
         i = contacts.active[k]
-        if mode[i] > FREE:
+        if contacts.mode[i] > FREE:
             w = dt * push.factor * weight[i]
-            u0, u1 = v_star[3 * i] + w * direction[3 * i], v_star[3 * i + 1] + w * direction[3 * i + 1]
-            u0, u1, u2 = settled(contacts, i, u0, u1, v_star[3 * i + 2] + w * direction[3 * i + 2])
-            fastest = max(fastest, u0 * u0 + u1 * u1 + u2 * u2)
+            u = settled(contacts, i, plus(row(nodes.v_star, i), times(w, row(push.direction, i))))
+            fastest = max(fastest, dot(u, u))
     return math.sqrt(fastest)
 
 
 @njit_lean
-def box_gap(x, triangles, f, p0, p1, p2):
+def box_gap(x, triangles, f, p):
     """Distance [m] of a point to the axis-aligned box of a triangle: never more than to the triangle (eq. 11.5)."""
-    a, b, c = triangles[f, 0], triangles[f, 1], triangles[f, 2]
-    d0 = max(min(x[a, 0], x[b, 0], x[c, 0]) - p0, p0 - max(x[a, 0], x[b, 0], x[c, 0]), 0.0)
-    d1 = max(min(x[a, 1], x[b, 1], x[c, 1]) - p1, p1 - max(x[a, 1], x[b, 1], x[c, 1]), 0.0)
-    d2 = max(min(x[a, 2], x[b, 2], x[c, 2]) - p2, p2 - max(x[a, 2], x[b, 2], x[c, 2]), 0.0)
-    return math.sqrt(d0 * d0 + d1 * d1 + d2 * d2)
+    a, b, c, square = triangles[f, 0], triangles[f, 1], triangles[f, 2], 0.0
+    for k in range(3):
+        low, high = min(x[a, k], x[b, k], x[c, k]), max(x[a, k], x[b, k], x[c, k])
+        d = max(low - p[k], p[k] - high, 0.0)
+        square += d * d
+    return math.sqrt(square)
 
 
 @njit_lean
@@ -65,15 +66,14 @@ def find_near(nodes, tips, step, probes, reach):
     """
     surface, reach = probes.surface, SAFE * reach
     for p in range(probes.radius.shape[0]):
-        p0, p1, p2 = tips.start[step, p, 0], tips.start[step, p, 1], tips.start[step, p, 2]
-        count = 0
+        tip, count = row(tips.start[step], p), 0
         for block in range(probes.wake.shape[1]):
             if probes.skipping and probes.wake[p, block] > probes.travel[0] + reach:
                 continue
             begin, end = TRIANGLE_BLOCK * block, min(TRIANGLE_BLOCK * (block + 1), surface.shape[0])
             nearest = math.inf
             for f in range(begin, end):
-                gap = box_gap(nodes.x, surface, f, p0, p1, p2) - probes.radius[p]
+                gap = box_gap(nodes.x, surface, f, tip) - probes.radius[p]
                 nearest = min(nearest, gap)
                 if not probes.skipping or gap <= reach:
                     probes.near[p, count] = f

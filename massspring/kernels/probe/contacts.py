@@ -10,9 +10,9 @@ Eliminating the change of pressure δ leaves A c ≥ right with A_kl = Σ_i b_ki
 """
 
 from massspring.kernels.constraint.schur import solve_dense
-from massspring.kernels.contact.modes import FREE
-from massspring.kernels.contact.node_contact import allowed_part
+from massspring.kernels.contact.constrained_motion import allowed
 from massspring.kernels.jit.decorators import njit_lean
+from massspring.kernels.jit.vec3 import add_to, dot, put, row, times
 from massspring.kernels.probe.pressure import answer_into, change_of_rows, flow_into
 
 RIGID = 1e-10
@@ -57,22 +57,15 @@ def aim_rows(stage):
 
     right_k = [radius − n·(Σ b x − tip⁺)]/dt − n·Σ b u [m/s].
     """
-    rows, nodes, contacts, probes = stage.probes.rows, stage.nodes, stage.contacts, stage.probes
+    rows, nodes, probes = stage.probes.rows, stage.nodes, stage.probes
     for k in range(rows.count[0]):
-        p = rows.probe[k]
-        d0, d1, d2 = rows.direction[k, 0], rows.direction[k, 1], rows.direction[k, 2]
-        end = stage.tips.end
-        gap = -(d0 * end[stage.step, p, 0] + d1 * end[stage.step, p, 1] + d2 * end[stage.step, p, 2])
-        approach = 0.0
+        p, d = rows.probe[k], row(rows.direction, k)
+        gap, approach = -dot(d, row(stage.tips.end[stage.step], p)), 0.0
         for q in range(3):
             i, b = rows.node[k, q], rows.weight[k, q]
-            approach += b * (d0 * probes.base[i, 0] + d1 * probes.base[i, 1] + d2 * probes.base[i, 2])
-            gap += b * (d0 * nodes.x[i, 0] + d1 * nodes.x[i, 1] + d2 * nodes.x[i, 2])
-            w, m0, m1, m2 = stage.model.inverse_mass[i], d0, d1, d2
-            if contacts.mode[i] > FREE:
-                e0, e1, e2 = contacts.direction[i, 0], contacts.direction[i, 1], contacts.direction[i, 2]
-                m0, m1, m2 = allowed_part(contacts.mode[i], e0, e1, e2, m0, m1, m2)
-            rows.moves[k, q, 0], rows.moves[k, q, 1], rows.moves[k, q, 2] = w * m0, w * m1, w * m2
+            approach += b * dot(d, row(probes.base, i))
+            gap += b * dot(d, row(nodes.x, i))
+            put(rows.moves[k], q, times(stage.model.inverse_mass[i], allowed(stage.contacts, i, d)))
         rows.right[k] = (probes.radius[p] - gap) / stage.dt - approach
 
 
@@ -157,8 +150,7 @@ def spread_push(rows, push, inverse_mass):
     for k in range(rows.count[0]):
         for q in range(3):
             i, share = rows.node[k, q], rows.weight[k, q] * rows.impulse[k]
-            for axis in range(3):
-                push[i, axis] += share * rows.moves[k, q, axis]
+            add_to(push, i, times(share, row(rows.moves[k], q)))
             fastest += inverse_mass[i] * share
     return fastest
 
@@ -168,8 +160,7 @@ def clear_push(rows, push):
     """Sets the pushes of all rows to 0."""
     for k in range(rows.count[0]):
         for q in range(3):
-            for axis in range(3):
-                push[rows.node[k, q], axis] = 0.0
+            put(push, rows.node[k, q], (0.0, 0.0, 0.0))
 
 
 @njit_lean

@@ -11,6 +11,7 @@ import numpy as np
 from massspring.kernels.contact.node_contact import axis_share
 from massspring.kernels.jit.by_address import by_address
 from massspring.kernels.jit.decorators import njit_lean
+from massspring.kernels.jit.vec3 import cross, dot, minus, over, plus, put, row, times, triple
 
 NEVER = 2.0
 """Time of a meeting that does not happen within the step, whose times run from 0 to 1."""
@@ -49,40 +50,27 @@ def nearest_into(corner, weight):
 
     The nearest of the foot on the plane, if inside, and of the three edges; correct for degenerate triangles too.
     """
-    a0, a1, a2 = corner[0, 0], corner[0, 1], corner[0, 2]
-    b0, b1, b2 = corner[1, 0] - a0, corner[1, 1] - a1, corner[1, 2] - a2
-    c0, c1, c2 = corner[2, 0] - a0, corner[2, 1] - a1, corner[2, 2] - a2
-    n0, n1, n2 = b1 * c2 - b2 * c1, b2 * c0 - b0 * c2, b0 * c1 - b1 * c0
-    area = n0 * n0 + n1 * n1 + n2 * n2
-    best = math.inf
+    o, best = row(corner, 0), math.inf
+    b, c = minus(row(corner, 1), o), minus(row(corner, 2), o)
+    n = cross(b, c)
+    area = dot(n, n)
     if area > 0.0:
-        v = -((a1 * c2 - a2 * c1) * n0 + (a2 * c0 - a0 * c2) * n1 + (a0 * c1 - a1 * c0) * n2) / area
-        w = -((b1 * a2 - b2 * a1) * n0 + (b2 * a0 - b0 * a2) * n1 + (b0 * a1 - b1 * a0) * n2) / area
+        v = -dot(cross(o, c), n) / area
+        w = -dot(cross(b, o), n) / area
         if v >= 0.0 and w >= 0.0 and v + w <= 1.0:
-            q0, q1, q2 = a0 + v * b0 + w * c0, a1 + v * b1 + w * c1, a2 + v * b2 + w * c2
-            best = q0 * q0 + q1 * q1 + q2 * q2
+            q = plus(plus(o, times(v, b)), times(w, c))
+            best = dot(q, q)
             weight[0], weight[1], weight[2] = 1.0 - v - w, v, w
     for k in range(3):
-        j = (k + 1) % 3
-        p0, p1, p2 = corner[k, 0], corner[k, 1], corner[k, 2]
-        s0, s1, s2 = corner[j, 0] - p0, corner[j, 1] - p1, corner[j, 2] - p2
-        share = axis_share(-p0, -p1, -p2, s0, s1, s2)
-        q0, q1, q2 = p0 + share * s0, p1 + share * s1, p2 + share * s2
-        square = q0 * q0 + q1 * q1 + q2 * q2
+        j, p = (k + 1) % 3, row(corner, k)
+        s = minus(row(corner, j), p)
+        share = axis_share(times(-1.0, p), s)
+        q = plus(p, times(share, s))
+        square = dot(q, q)
         if square < best:
             best = square
             weight[k], weight[j], weight[3 - k - j] = 1.0 - share, share, 0.0
     return math.sqrt(best)
-
-
-@njit_lean
-def triple(p, i, q, j, r, k):
-    """p_i · (q_j × r_k) of rows of three arrays (3, 3) [m³]."""
-    return (
-        p[i, 0] * (q[j, 1] * r[k, 2] - q[j, 2] * r[k, 1])
-        + p[i, 1] * (q[j, 2] * r[k, 0] - q[j, 0] * r[k, 2])
-        + p[i, 2] * (q[j, 0] * r[k, 1] - q[j, 1] * r[k, 0])
-    )
 
 
 @njit_lean
@@ -91,10 +79,11 @@ def coplanarity(begin, move):
 
     f is six times the volume of the tetrahedron of point and triangle; it changes sign as the point crosses the plane.
     """
-    f0 = triple(begin, 0, begin, 1, begin, 2)
-    f1 = triple(move, 0, begin, 1, begin, 2) + triple(begin, 0, move, 1, begin, 2) + triple(begin, 0, begin, 1, move, 2)
-    f2 = triple(begin, 0, move, 1, move, 2) + triple(move, 0, begin, 1, move, 2) + triple(move, 0, move, 1, begin, 2)
-    return f0, f1, f2, triple(move, 0, move, 1, move, 2)
+    a, b, c = row(begin, 0), row(begin, 1), row(begin, 2)
+    p, q, r = row(move, 0), row(move, 1), row(move, 2)
+    f1 = triple(p, b, c) + triple(a, q, c) + triple(a, b, r)
+    f2 = triple(a, q, r) + triple(p, b, r) + triple(p, q, c)
+    return triple(a, b, c), f1, f2, triple(p, q, r)
 
 
 @njit_lean
@@ -130,28 +119,25 @@ def single_root(low, high, f0, f1, f2, f3):
 def at_time(pair, t):
     """Corners at time t of the step, in `pair.corner`."""
     for k in range(3):
-        for axis in range(3):
-            pair.corner[k, axis] = (1.0 - t) * pair.begin[k, axis] + t * pair.end[k, axis]
+        put(pair.corner, k, plus(times(1.0 - t, row(pair.begin, k)), times(t, row(pair.end, k))))
 
 
 @njit_lean
 def point_along(pair, sign):
     """Makes `direction` the triangle's unit normal times `sign`; without area or sign, against its motion
     (eq. 11.3)."""
-    y, d = pair.corner, pair.direction
-    b0, b1, b2 = y[1, 0] - y[0, 0], y[1, 1] - y[0, 1], y[1, 2] - y[0, 2]
-    c0, c1, c2 = y[2, 0] - y[0, 0], y[2, 1] - y[0, 1], y[2, 2] - y[0, 2]
-    d[0], d[1], d[2] = sign * (b1 * c2 - b2 * c1), sign * (b2 * c0 - b0 * c2), sign * (b0 * c1 - b1 * c0)
-    length = math.sqrt(d[0] ** 2 + d[1] ** 2 + d[2] ** 2)
-    longest = max(b0 * b0 + b1 * b1 + b2 * b2, c0 * c0 + c1 * c1 + c2 * c2)
-    if not length > ROUND_OFF * longest:
-        for axis in range(3):
-            d[axis] = 0.0
-            for k in range(3):
-                d[axis] -= pair.weight[k] * (pair.end[k, axis] - pair.begin[k, axis])
-        length = math.sqrt(d[0] ** 2 + d[1] ** 2 + d[2] ** 2)
+    o = row(pair.corner, 0)
+    b, c = minus(row(pair.corner, 1), o), minus(row(pair.corner, 2), o)
+    d = times(sign, cross(b, c))
+    length = math.sqrt(dot(d, d))
+    if not length > ROUND_OFF * max(dot(b, b), dot(c, c)):
+        d = (0.0, 0.0, 0.0)
+        for k in range(3):
+            d = minus(d, times(pair.weight[k], minus(row(pair.end, k), row(pair.begin, k))))
+        length = math.sqrt(dot(d, d))
     if length > 0.0:
-        d[0], d[1], d[2] = d[0] / length, d[1] / length, d[2] / length
+        d = over(d, length)
+    pair.direction[0], pair.direction[1], pair.direction[2] = d
 
 
 @njit_lean
@@ -162,12 +148,8 @@ def touching(pair, radius):
     """
     fastest, size = 0.0, 0.0
     for k in range(3):
-        s0, s1, s2 = (
-            pair.end[k, 0] - pair.begin[k, 0],
-            pair.end[k, 1] - pair.begin[k, 1],
-            pair.end[k, 2] - pair.begin[k, 2],
-        )
-        fastest = max(fastest, math.sqrt(s0 * s0 + s1 * s1 + s2 * s2))
+        s = minus(row(pair.end, k), row(pair.begin, k))
+        fastest = max(fastest, math.sqrt(dot(s, s)))
         for axis in range(3):
             size = max(size, abs(pair.begin[k, axis]), abs(pair.end[k, axis]))
     t, distance = 0.0, math.inf
@@ -179,10 +161,7 @@ def touching(pair, radius):
         if t == 1.0:
             return NEVER
         t = min(1.0, t + (distance - radius) / fastest) if fastest > 0.0 else 1.0
-    for axis in range(3):
-        pair.direction[axis] = 0.0
-        for k in range(3):
-            pair.direction[axis] += pair.weight[k] * pair.corner[k, axis] / distance
+    point_to(pair, pair.corner, distance)
     if not distance > ON * size:
         point_along(pair, 0.0)
     return t
@@ -248,3 +227,12 @@ def crossing(pair):
             break
         low, before = high, after
     return NEVER
+
+
+@njit_lean
+def point_to(pair, corner, distance):
+    """Makes `direction` that from the point to the meeting point of `corner` (3, 3), which is `distance` [m] away."""
+    for axis in range(3):
+        pair.direction[axis] = 0.0
+        for k in range(3):
+            pair.direction[axis] += pair.weight[k] * corner[k, axis] / distance

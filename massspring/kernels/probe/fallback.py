@@ -10,10 +10,11 @@ import math
 from massspring.kernels.arrays.layout import Push
 from massspring.kernels.contact.modes import FREE, STICKS
 from massspring.kernels.jit.decorators import njit_lean
+from massspring.kernels.jit.vec3 import add_to, dot, minus, over, plus, put, row, times
 from massspring.kernels.probe.arrays import CARRIED, CARRYING, LEFT_BEHIND
 from massspring.kernels.probe.broad_phase import ROOM, find_near
 from massspring.kernels.probe.contacts import clear_push
-from massspring.kernels.probe.motion import carried_speed, gather, move
+from massspring.kernels.probe.motion import carried_speed, gather, move, tip_way
 from massspring.kernels.probe.pressure import answer_into, faster_by, prepare, pressed_on
 from massspring.kernels.probe.search import look
 
@@ -35,9 +36,8 @@ def carry_node(stage, p, i):
     probes.taken_count[0] += 1
     probes.counts[CARRIED] += 1
     contacts.mode[i] = STICKS
-    for axis in range(3):
-        # The velocity without contact; `gather` no longer needs `v_target`.
-        contacts.v_target[i, axis] = probes.base[i, axis]
+    # The velocity without contact; `gather` no longer needs `v_target`.
+    put(contacts.v_target, i, row(probes.base, i))
 
 
 @njit_lean
@@ -47,24 +47,18 @@ def overshoot(stage, p, n):
     The corners share Σ b_i Δ_i = −(motion of the point towards the tip) by their weights. Returns whether there are
     any.
     """
-    probes, pair, radius = stage.probes, stage.probes.pair, stage.probes.radius[p]
-    f = probes.near[p, n]
-    square, free, length, shift = 0.0, 0.0, 0.0, (0.0, 0.0, 0.0)
+    probes, radius, f = stage.probes, stage.probes.radius[p], stage.probes.near[p, n]
+    square, free, shift = 0.0, 0.0, (0.0, 0.0, 0.0)
     for k in range(3):
         i, b = probes.surface[f, k], probes.passing[n, k]
         if probes.carried[i] > 0:
             square += b * b
             free += b
-        v = probes.velocity
-        shift = (shift[0] - b * v[i, 0], shift[1] - b * v[i, 1], shift[2] - b * v[i, 2])
+        shift = minus(shift, times(b, row(probes.velocity, i)))
     if free < FREE_SHARE:
         return False
-    shift = (
-        shift[0] + (pair.tip[1, 0] - pair.tip[0, 0]) / stage.dt,
-        shift[1] + (pair.tip[1, 1] - pair.tip[0, 1]) / stage.dt,
-        shift[2] + (pair.tip[1, 2] - pair.tip[0, 2]) / stage.dt,
-    )
-    length = math.sqrt(shift[0] ** 2 + shift[1] ** 2 + shift[2] ** 2)
+    shift = plus(shift, over(tip_way(stage.tips, stage.step, p), stage.dt))
+    length = math.sqrt(dot(shift, shift))
     if not length > 0.0:
         return False
     # One radius farther, so that it does not end on the tip.
@@ -72,10 +66,7 @@ def overshoot(stage, p, n):
     for k in range(3):
         i = probes.surface[f, k]
         if probes.carried[i] > 0:
-            b = farther * probes.passing[n, k]
-            probes.push[i, 0] += b * shift[0]
-            probes.push[i, 1] += b * shift[1]
-            probes.push[i, 2] += b * shift[2]
+            add_to(probes.push, i, times(farther * probes.passing[n, k], shift))
     return True
 
 
@@ -105,23 +96,21 @@ def compensate_volume(stage, volumes):
 
     Returns a bound on the velocity that δ adds to a node [m/s].
     """
-    probes, model, nodes, contacts = stage.probes, stage.model, stage.nodes, stage.contacts
+    probes, nodes, contacts = stage.probes, stage.nodes, stage.contacts
     flow, answer, change = probes.rows.flow[0], probes.rows.answer[0], probes.change
     for r in range(change.shape[0]):
         flow[r], answer[r], change[r] = 0.0, 0.0, 0.0
     taken = 0.0
     for k in range(probes.taken_count[0]):
         i = probes.taken[k]
-        s0, s1, s2 = carried_speed(stage, i)
-        s0, s1, s2 = s0 - contacts.v_target[i, 0], s1 - contacts.v_target[i, 1], s2 - contacts.v_target[i, 2]
+        s = minus(carried_speed(stage, i), row(contacts.v_target, i))
         if volumes is None:
-            g = nodes.gradient
-            flow[0] -= g[i, 0] * s0 + g[i, 1] * s1 + g[i, 2] * s2
-            taken += model.inverse_mass[i] * (g[i, 0] ** 2 + g[i, 1] ** 2 + g[i, 2] ** 2)
+            g = row(nodes.gradient, i)
+            flow[0] -= dot(g, s)
+            taken += stage.model.inverse_mass[i] * dot(g, g)
         else:
             for t in range(volumes.node_start[i], volumes.node_start[i + 1]):
-                e, j = volumes.node_entry[t], volumes.value
-                flow[volumes.node_row[t]] -= j[e, 0] * s0 + j[e, 1] * s1 + j[e, 2] * s2
+                flow[volumes.node_row[t]] -= dot(row(volumes.value, volumes.node_entry[t]), s)
     if volumes is None:
         left = stage.mobility - taken
         answer[0] = flow[0] / left if left > LEFT * stage.mobility else 0.0
@@ -156,8 +145,8 @@ def carry(stage, volumes, push, plain, horizon):
             break
         fastest = 0.0
         for k in range(probes.taken_count[0]):
-            s0, s1, s2 = carried_speed(stage, probes.taken[k])
-            fastest = max(fastest, math.sqrt(s0 * s0 + s1 * s1 + s2 * s2))
+            s = carried_speed(stage, probes.taken[k])
+            fastest = max(fastest, math.sqrt(dot(s, s)))
         reach = plain + stage.dt * (fastest + compensate_volume(stage, volumes))
         if reach > horizon:
             horizon = ROOM * reach
@@ -194,12 +183,11 @@ def settle_carried(stage, push):
     for k in range(probes.taken_count[0]):
         i = probes.taken[k]
         p = probes.carried[i] - 1
-        speed = carried_speed(stage, i)
         w = stage.dt * push.factor * model.inverse_mass[i]
-        for axis in range(3):
-            gain = speed[axis] - w * push.direction[i, axis] - nodes.v_star[i, axis]
-            nodes.v_star[i, axis] += gain
-            impulse[first + p, axis] += model.mass[i] * gain
-            probes.push[i, axis] = 0.0
+        pushed = minus(carried_speed(stage, i), times(w, row(push.direction, i)))
+        gain = minus(pushed, row(nodes.v_star, i))
+        add_to(nodes.v_star, i, gain)
+        add_to(impulse, first + p, times(model.mass[i], gain))
+        put(probes.push, i, (0.0, 0.0, 0.0))
         probes.carried[i], contacts.mode[i] = 0, FREE
     probes.taken_count[0] = 0

@@ -3,6 +3,7 @@
 import math
 
 from massspring.kernels.jit.decorators import njit_lean
+from massspring.kernels.jit.vec3 import dot, minus, put, row, triple
 from massspring.kernels.probe.broad_phase import box_gap
 from massspring.kernels.probe.continuous import nearest_into
 
@@ -14,12 +15,11 @@ def distance_to(point, x, triangles, corner, weight):
 
     A triangle whose box is farther than the nearest triangle so far is skipped.
     """
-    nearest = math.inf
+    nearest, o = math.inf, (point[0], point[1], point[2])
     for f in range(triangles.shape[0]):
-        if box_gap(x, triangles, f, point[0], point[1], point[2]) < nearest:
+        if box_gap(x, triangles, f, o) < nearest:
             for k in range(3):
-                for axis in range(3):
-                    corner[k, axis] = x[triangles[f, k], axis] - point[axis]
+                put(corner, k, minus(row(x, triangles[f, k]), o))
             nearest = min(nearest, nearest_into(corner, weight))
     return nearest
 
@@ -30,16 +30,10 @@ def winding_number_at(point, x, triangles):
 
     Van Oosterom and Strackee (1983), equation 8: tan(Ω/2) = a·(b × c) / (|a||b||c| + a·b |c| + b·c |a| + c·a |b|).
     """
-    half = 0.0
+    half, o = 0.0, (point[0], point[1], point[2])
     for f in range(triangles.shape[0]):
-        i, j, k = triangles[f, 0], triangles[f, 1], triangles[f, 2]
-        a0, a1, a2 = x[i, 0] - point[0], x[i, 1] - point[1], x[i, 2] - point[2]
-        b0, b1, b2 = x[j, 0] - point[0], x[j, 1] - point[1], x[j, 2] - point[2]
-        c0, c1, c2 = x[k, 0] - point[0], x[k, 1] - point[1], x[k, 2] - point[2]
-        a = math.sqrt(a0 * a0 + a1 * a1 + a2 * a2)
-        b = math.sqrt(b0 * b0 + b1 * b1 + b2 * b2)
-        c = math.sqrt(c0 * c0 + c1 * c1 + c2 * c2)
-        triple = a0 * (b1 * c2 - b2 * c1) + a1 * (b2 * c0 - b0 * c2) + a2 * (b0 * c1 - b1 * c0)
-        ab, bc, ca = a0 * b0 + a1 * b1 + a2 * b2, b0 * c0 + b1 * c1 + b2 * c2, c0 * a0 + c1 * a1 + c2 * a2
-        half += math.atan2(triple, a * b * c + ab * c + bc * a + ca * b)
+        p, q, r = row(x, triangles[f, 0]), row(x, triangles[f, 1]), row(x, triangles[f, 2])
+        p, q, r = minus(p, o), minus(q, o), minus(r, o)
+        a, b, c = math.sqrt(dot(p, p)), math.sqrt(dot(q, q)), math.sqrt(dot(r, r))
+        half += math.atan2(triple(p, q, r), a * b * c + dot(p, q) * c + dot(q, r) * a + dot(r, p) * b)
     return half / (2.0 * math.pi)

@@ -7,9 +7,9 @@ import math
 
 from massspring.kernels.constraint.jacobian import diagonal_into, transposed_rows_times_into
 from massspring.kernels.constraint.schur import dense_into, factor_dense, solve_iteratively, substitute
-from massspring.kernels.contact.modes import FREE
-from massspring.kernels.contact.node_contact import allowed_part
+from massspring.kernels.contact.constrained_motion import allowed
 from massspring.kernels.jit.decorators import njit_lean
+from massspring.kernels.jit.vec3 import dot, plus, row, times
 
 ACCURATE = 1e-7
 """Residual that an iterative solve may leave, over the largest flow. The next step corrects it, as any volume error."""
@@ -33,16 +33,13 @@ def flow_into(stage, volumes, k):
     for r in range(rows.flow.shape[1]):
         rows.flow[k, r] = 0.0
     for q in range(3):
-        i, b, m = rows.node[k, q], rows.weight[k, q], rows.moves
+        i, b, m = rows.node[k, q], rows.weight[k, q], row(rows.moves[k], q)
         if volumes is None:
-            g = stage.nodes.gradient
             if stage.mobility > 0.0:
-                rows.flow[k, 0] += b * (g[i, 0] * m[k, q, 0] + g[i, 1] * m[k, q, 1] + g[i, 2] * m[k, q, 2])
+                rows.flow[k, 0] += b * dot(row(stage.nodes.gradient, i), m)
         else:
             for t in range(volumes.node_start[i], volumes.node_start[i + 1]):
-                e, r = volumes.node_entry[t], volumes.node_row[t]
-                j = volumes.value
-                rows.flow[k, r] += b * (j[e, 0] * m[k, q, 0] + j[e, 1] * m[k, q, 1] + j[e, 2] * m[k, q, 2])
+                rows.flow[k, volumes.node_row[t]] += b * dot(row(volumes.value, volumes.node_entry[t]), m)
 
 
 @njit_lean
@@ -87,23 +84,13 @@ def faster_by(stage, felt):
 @njit_lean
 def swelling(stage, volumes, i):
     """dt W̃_i (Jᵀ δ)_i [m/s], the velocity that the change of pressures adds to node i (eq. 11.6)."""
-    nodes, contacts, change = stage.nodes, stage.contacts, stage.probes.change
-    s0, s1, s2 = 0.0, 0.0, 0.0
+    change, s = stage.probes.change, (0.0, 0.0, 0.0)
     if volumes is None:
-        g, p = nodes.gradient, change[0]
-        s0, s1, s2 = p * g[i, 0], p * g[i, 1], p * g[i, 2]
+        s = times(change[0], row(stage.nodes.gradient, i))
     else:
         for t in range(volumes.node_start[i], volumes.node_start[i + 1]):
-            e, p = volumes.node_entry[t], change[volumes.node_row[t]]
-            s0 += p * volumes.value[e, 0]
-            s1 += p * volumes.value[e, 1]
-            s2 += p * volumes.value[e, 2]
-    push = stage.dt * stage.model.inverse_mass[i]
-    s0, s1, s2 = push * s0, push * s1, push * s2
-    if contacts.mode[i] > FREE:
-        d0, d1, d2 = contacts.direction[i, 0], contacts.direction[i, 1], contacts.direction[i, 2]
-        s0, s1, s2 = allowed_part(contacts.mode[i], d0, d1, d2, s0, s1, s2)
-    return s0, s1, s2
+            s = plus(s, times(change[volumes.node_row[t]], row(volumes.value, volumes.node_entry[t])))
+    return allowed(stage.contacts, i, times(stage.dt * stage.model.inverse_mass[i], s))
 
 
 @njit_lean

@@ -1,9 +1,10 @@
 """Triangles that a thin tip crosses, or comes too near to, with the current contacts (docs/theory.md, section 11)."""
 
 from massspring.kernels.jit.decorators import njit_lean
+from massspring.kernels.jit.vec3 import minus, plus, put, row, times
 from massspring.kernels.probe.arrays import TESTED
 from massspring.kernels.probe.contacts import row_of, set_row
-from massspring.kernels.probe.continuous import NEVER, crossing, nearest_into, passes_by, stays_off, touching
+from massspring.kernels.probe.continuous import NEVER, crossing, nearest_into, passes_by, point_to, stays_off, touching
 
 SAME_TIME = 1e-6
 """Difference in time, over the step, within which crossings count as simultaneous: triangles that share the edge or
@@ -16,12 +17,13 @@ the step."""
 @njit_lean
 def pair_into(pair, x, velocity, triangles, f, dt):
     """Corners of a triangle relative to the tip of `pair`, at the start of the step and at its end [m]."""
+    tip = row(pair.tip, 0)
+    way = minus(row(pair.tip, 1), tip)
     for k in range(3):
         i = triangles[f, k]
-        for axis in range(3):
-            pair.begin[k, axis] = x[i, axis] - pair.tip[0, axis]
-            way = dt * velocity[i, axis] - (pair.tip[1, axis] - pair.tip[0, axis])
-            pair.end[k, axis] = pair.begin[k, axis] + way
+        begin = minus(row(x, i), tip)
+        put(pair.begin, k, begin)
+        put(pair.end, k, plus(begin, minus(times(dt, row(velocity, i)), way)))
 
 
 @njit_lean
@@ -29,9 +31,8 @@ def look(stage, p):
     """When and where the tip passes through each near triangle with the current contacts. Returns the first time, or
     NEVER."""
     probes, x, triangles, pair = stage.probes, stage.nodes.x, stage.probes.surface, stage.probes.pair
-    for axis in range(3):
-        pair.tip[0, axis] = stage.tips.start[stage.step, p, axis]
-        pair.tip[1, axis] = stage.tips.end[stage.step, p, axis]
+    put(pair.tip, 0, row(stage.tips.start[stage.step], p))
+    put(pair.tip, 1, row(stage.tips.end[stage.step], p))
     first = NEVER
     for n in range(probes.near_count[p]):
         pair_into(pair, x, probes.velocity, triangles, probes.near[p, n], stage.dt)
@@ -79,10 +80,7 @@ def add_touches(stage, p):
         if row_of(probes.rows, p, f) == probes.rows.count[0]:
             touching(pair, probes.radius[p])
         elif distance < ENOUGH * probes.radius[p]:
-            for axis in range(3):
-                pair.direction[axis] = 0.0
-                for k in range(3):
-                    pair.direction[axis] += pair.weight[k] * pair.end[k, axis] / distance
+            point_to(pair, pair.end, distance)
         else:
             continue
         room += set_row(probes.rows, p, f, triangles, pair)

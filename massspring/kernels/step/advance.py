@@ -1,10 +1,12 @@
 """The end of a step: symplectic Euler for all nodes, and the impulses of obstacles."""
 
-from massspring.kernels.contact.bookkeeping import book_contacts, settled
+from massspring.kernels.contact.bookkeeping import book_contacts
+from massspring.kernels.contact.constrained_motion import settled
 from massspring.kernels.contact.modes import FREE
 from massspring.kernels.fused.padded import pad_positions
 from massspring.kernels.jit.decorators import njit_exposed, njit_inlined
 from massspring.kernels.jit.flat import flat
+from massspring.kernels.jit.vec3 import plus, put, row, times
 
 NEAR = 4096
 """Nodes per block: new positions are padded while they are still in the second-level cache."""
@@ -26,13 +28,12 @@ def advance_nodes(nodes, contacts, work, inverse_mass, push, dt, first, last):
             u = flat_v_star[3 * i + axis] + w * direction[3 * i + axis]
             flat_v[3 * i + axis] = u
             flat_x[3 * i + axis] += step * u
-    x, v, padded = nodes.x, nodes.v, work.padded_positions
+    x, v = nodes.x, nodes.v
     for k in range(contacts.active_count[0]):
         i = contacts.active[k]
         if first <= i < last and mode[i] > FREE:
-            v[i, 0], v[i, 1], v[i, 2] = settled(contacts, i, v[i, 0], v[i, 1], v[i, 2])
-            for axis in range(3):
-                x[i, axis] = padded[i, axis] + step * v[i, axis]
+            put(v, i, settled(contacts, i, row(v, i)))
+            put(x, i, plus(row(work.padded_positions, i), times(step, row(v, i))))
 
 
 @njit_exposed

@@ -1,6 +1,7 @@
 """Nodes whose motion is prescribed."""
 
 from massspring.kernels.jit.decorators import njit_exposed, njit_lean
+from massspring.kernels.jit.vec3 import plus, row, times
 
 
 @njit_lean
@@ -33,18 +34,13 @@ def add_held_impulse(model, nodes, push, dt, gravity, held_impulse):
     """I_g = −dt Σ_i∈g (f_i + push_i + m_i g) [N s]: impulse of an attachment on the body, without the inertia of held
     nodes (eq. 3.6)."""
     held_nodes, groups, mass = model.held_nodes, model.held_group, model.mass
-    force, direction, factor = nodes.force, push.direction, push.factor
     h, count = 0, held_nodes.shape[0]
     while h < count:
-        g = groups[h]
-        k0, k1, k2, carried = 0.0, 0.0, 0.0, 0.0
+        g, carried, force = groups[h], 0.0, (0.0, 0.0, 0.0)
         while h < count and groups[h] == g:
             i = held_nodes[h]
-            k0 += force[i, 0] + factor * direction[i, 0]
-            k1 += force[i, 1] + factor * direction[i, 1]
-            k2 += force[i, 2] + factor * direction[i, 2]
+            force = plus(force, plus(row(nodes.force, i), times(push.factor, row(push.direction, i))))
             carried += mass[i]
             h += 1
-        held_impulse[g, 0] -= dt * (k0 + carried * gravity[0])
-        held_impulse[g, 1] -= dt * (k1 + carried * gravity[1])
-        held_impulse[g, 2] -= dt * (k2 + carried * gravity[2])
+        for axis in range(3):
+            held_impulse[g, axis] -= dt * (force[axis] + carried * gravity[axis])

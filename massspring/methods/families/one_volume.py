@@ -18,12 +18,12 @@ from massspring.kernels.arrays.layout import BoundaryConditions, Push
 from massspring.kernels.constraint.exact_volume import LineSearch, line_into, nearest_root, volume_cubic
 from massspring.kernels.constraint.one_volume import limited_error, steepest, surely_short, volume_multiplier
 from massspring.kernels.contact.active_set import pressure_reach
-from massspring.kernels.contact.modes import FREE
-from massspring.kernels.contact.node_contact import allowed_part
+from massspring.kernels.contact.constrained_motion import allowed
 from massspring.kernels.forces.volume import volume_gradient_into
 from massspring.kernels.fused.padded import pad_positions
 from massspring.kernels.jit.decorators import compiled, njit_lean
 from massspring.kernels.jit.stage_clock import MULTIPLIER, VOLUME, end_stage
+from massspring.kernels.jit.vec3 import add_to, plus, put, row, times
 from massspring.kernels.step.begin import begin_step, multiplier_stands, open_frame, search_contacts
 from massspring.kernels.step.end import end_step
 from massspring.layout.state import State
@@ -94,8 +94,7 @@ def exact_multiplier(model, nodes, contacts, line, target, mobility, dt):
 def predicted_gradient_into(model, nodes, line, dt):
     """G at x + dt v* [m²], (n, 3), before contact (eq. 2.2, 3.1)."""
     for i in range(nodes.x.shape[0]):
-        for axis in range(3):
-            line.y[i, axis] = nodes.x[i, axis] + dt * nodes.v_star[i, axis]
+        put(line.y, i, plus(row(nodes.x, i), times(dt, row(nodes.v_star, i))))
     volume_gradient_into(line.y, model.triangles, nodes.gradient)
 
 
@@ -110,13 +109,7 @@ def correct_positions(model, nodes, contacts, target, dt):
     part = limited_error(error, mobility, steepest(nodes.gradient, model.inverse_mass), model.correction_limit)
     for i in range(nodes.x.shape[0]):
         push = model.inverse_mass[i] * part / mobility
-        p0, p1, p2 = push * nodes.gradient[i, 0], push * nodes.gradient[i, 1], push * nodes.gradient[i, 2]
-        if contacts.mode[i] > FREE:
-            d0, d1, d2 = contacts.direction[i, 0], contacts.direction[i, 1], contacts.direction[i, 2]
-            p0, p1, p2 = allowed_part(contacts.mode[i], d0, d1, d2, p0, p1, p2)
-        nodes.x[i, 0] += p0
-        nodes.x[i, 1] += p1
-        nodes.x[i, 2] += p2
+        add_to(nodes.x, i, allowed(contacts, i, times(push, row(nodes.gradient, i))))
     return part != error
 
 

@@ -10,8 +10,9 @@ Limits: an angle below π is the same in a bulge and in a dent of equal depth; a
 changing (all lengths by one factor). Only stiffness resists a change of volume, and it also adds to the force.
 """
 
+import math
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from scipy.sparse import csr_array
@@ -20,20 +21,67 @@ from massspring.body.body import Body
 from massspring.body.springs import EDGES_OF_TRIANGLE, unique_edges
 from massspring.errors import MassSpringError
 from massspring.kernels.arrays.layout import BoundaryConditions, Push
+from massspring.kernels.jit.by_address import by_address
 from massspring.kernels.jit.decorators import njit_lean
 from massspring.kernels.jit.stage_clock import SPRINGS, end_stage
+from massspring.kernels.jit.vec3 import add_to, cross, dot, minus, over, plus, row, take_from, times
 from massspring.kernels.step.begin import begin_step, open_frame, search_contacts
 from massspring.kernels.step.end import end_step
 from massspring.layout.allocate import start
 from massspring.layout.state import State
 from massspring.methods.capabilities import Capabilities, No
-from massspring.methods.literature.angles import Angles, angle_forces_into, opening
 from massspring.methods.method import Method, begin_frame
 from massspring.world.obstacles import Attachment
 from massspring.world.surroundings import Surroundings
 
 TIE = 1e-9
 """Difference below which two cosines count as equal; the first node is then chosen."""
+STRAIGHT = 1e-12
+"""Sine below which an angle counts as 0 or π: its gradient then has no direction."""
+
+
+@by_address
+class Angles(NamedTuple):
+    """a angles at nodes."""
+
+    corner: np.ndarray
+    """First end, apex and second end, (a, 3) int64."""
+    rest: np.ndarray
+    """[rad], (a,)."""
+    stiffness: np.ndarray
+    """κ [N m], (a,)."""
+
+
+@njit_lean
+def opening(x, i, apex, j):
+    """(θ, sin θ, cos θ) of the angle between the edges from `apex` to i and j, and their lengths [m]; NaN if an edge
+    has no length."""
+    a, b = minus(row(x, i), row(x, apex)), minus(row(x, j), row(x, apex))
+    c = cross(a, b)
+    across, along = math.sqrt(dot(c, c)), dot(a, b)
+    la, lb = math.sqrt(dot(a, a)), math.sqrt(dot(b, b))
+    return math.atan2(across, along), across / (la * lb), along / (la * lb), la, lb
+
+
+@njit_lean
+def angle_forces_into(x, angles, force):
+    """f = −κ (θ − θ0) ∂θ/∂x [N], (n, 3), ∂θ/∂x_i = (cos θ â − b̂)/(|a| sin θ) (eq. 14.6).
+
+    An angle of 0 or π has no direction to bend in and gives no force. Internal: forces and moments sum to zero.
+    """
+    force[:] = 0.0
+    for k in range(angles.rest.shape[0]):
+        i, apex, j = row(angles.corner, k)
+        theta, sine, cosine, la, lb = opening(x, i, apex, j)
+        if sine < STRAIGHT:
+            continue
+        moment = -angles.stiffness[k] * (theta - angles.rest[k]) / sine
+        a, b = over(minus(row(x, i), row(x, apex)), la), over(minus(row(x, j), row(x, apex)), lb)
+        first = over(times(moment, minus(times(cosine, a), b)), la)
+        second = over(times(moment, minus(times(cosine, b), a)), lb)
+        add_to(force, i, first)
+        add_to(force, j, second)
+        take_from(force, apex, plus(first, second))
 
 
 @njit_lean

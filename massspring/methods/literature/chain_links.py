@@ -12,6 +12,7 @@ import numpy as np
 from massspring.kernels.contact.gaps import gap_and_normal
 from massspring.kernels.jit.by_address import by_address
 from massspring.kernels.jit.decorators import njit_inlined, njit_lean
+from massspring.kernels.jit.vec3 import minus, put, row, times
 
 TOUCHING = 1e-12
 """Depth inside an obstacle up to which a node lies on it [m]."""
@@ -108,13 +109,11 @@ def push_out(x, model, mail, boundary, step):
 @njit_inlined
 def lifted(x, boundary, step, i):
     """Moves node i out of all obstacles that contain it, one after the other. Returns whether there was one."""
-    inside = False
+    inside, place = False, boundary.position[step]
     for o in range(boundary.radius.shape[0]):
-        place = boundary.position[step, o]
-        r0, r1, r2 = x[i, 0] - place[0], x[i, 1] - place[1], x[i, 2] - place[2]
-        gap, n0, n1, n2 = gap_and_normal(boundary, o, r0, r1, r2)
+        gap, n = gap_and_normal(boundary, o, minus(row(x, i), row(place, o)))
         if gap < -TOUCHING:
-            x[i, 0], x[i, 1], x[i, 2] = x[i, 0] - gap * n0, x[i, 1] - gap * n1, x[i, 2] - gap * n2
+            put(x, i, minus(row(x, i), times(gap, n)))
             inside = True
     return inside
 
@@ -143,7 +142,7 @@ def relax(x, model, mail, boundary, when):
         first, last = links.start[i], links.start[i + 1]
         if model.inverse_mass[i] == 0.0 or first == last:
             continue
-        old0, old1, old2 = x[i, 0], x[i, 1], x[i, 2]
+        old = row(x, i)
         for axis in range(3):
             mean = 0.0
             for e in range(first, last):
@@ -154,15 +153,14 @@ def relax(x, model, mail, boundary, when):
         for axis in range(3):
             x[i, axis] = bounded(x, links, i, axis, x[i, axis])
         if model.touchable[i] > 0 and is_inside(x, boundary, step, i):
-            x[i, 0], x[i, 1], x[i, 2] = old0, old1, old2
+            put(x, i, old)
 
 
 @njit_inlined
 def is_inside(x, boundary, step, i):
     """Whether node i is inside an obstacle by more than TOUCHING."""
+    place = boundary.position[step]
     for o in range(boundary.radius.shape[0]):
-        place = boundary.position[step, o]
-        gap, _, _, _ = gap_and_normal(boundary, o, x[i, 0] - place[0], x[i, 1] - place[1], x[i, 2] - place[2])
-        if gap < -TOUCHING:
+        if gap_and_normal(boundary, o, minus(row(x, i), row(place, o)))[0] < -TOUCHING:
             return True
     return False

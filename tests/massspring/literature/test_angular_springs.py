@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from massspring import AngularSprings, Clock, Free, MassSpringError, Ramp, Setup, membrane_body, simulate
-from massspring.methods.literature.angles import Angles, angle_energy, angle_forces_into
-from massspring.methods.literature.angular_springs import angles_of
+from massspring.methods.literature.angular_springs import Angles, angle_forces_into, angles_of, opening
 from tests.massspring.conftest import SOFT, icosphere
 from tests.massspring.methods.test_cells import rest_forces
 from tests.massspring.methods.test_methods import clock_for, squeeze
@@ -31,6 +30,12 @@ def test_and_on_a_surface(promise, ball_body):
 
 def shaken(body, size=0.1):
     return body.rest + size * 0.02 * np.random.default_rng(5).uniform(-1, 1, body.rest.shape)
+
+
+def angle_energy(x, angles):
+    """Σ ½ κ (θ − θ0)² [J] (eq. 14.5)."""
+    now = np.array([opening(x, *corner)[0] for corner in angles.corner])
+    return 0.5 * angles.stiffness @ (now - angles.rest) ** 2
 
 
 def test_forces_are_the_slope_of_the_energy(body):

@@ -71,14 +71,14 @@ def test_cell_forces_are_minus_the_derivative_of_their_energy(block_body, kind):
 def test_the_slopes_of_a_cell_are_those_of_its_volume(block_body):
     x, step = deformed(block_body), 1e-6 * block_body.size
     a, b, c, d = block_body.tetrahedra[3]
-    volume, *slopes = cell_slopes(x, a, b, c, d)
+    volume, *slopes = cell_slopes(x, (a, b, c, d))
     assert volume == pytest.approx(cell_volumes(block_body, x)[3], rel=1e-12)
     for number, node in enumerate((b, c, d)):
         for axis in range(3):
             move = np.zeros_like(x)
             move[node, axis] = step
             change = cell_volumes(block_body, x + move)[3] - cell_volumes(block_body, x - move)[3]
-            assert slopes[3 * number + axis] == pytest.approx(change / (2 * step), rel=1e-6, abs=1e-12)
+            assert slopes[number][axis] == pytest.approx(change / (2 * step), rel=1e-6, abs=1e-12)
 
 
 @pytest.mark.parametrize("kind", CELL_FORCES)

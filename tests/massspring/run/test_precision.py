@@ -41,7 +41,7 @@ def test_the_search_of_round_obstacles_stays_in_single_precision(axis):
     """Against the distance in double precision; a double in between would slow the loop, and show in the digits."""
     span, radius = np.array(axis, dtype=np.float32), np.float32(0.02)
     places = np.random.default_rng(1).uniform(-0.1, 0.1, size=(200, 3)).astype(np.float32)
-    gaps = np.array([float(round_gap(*r, *span, radius)) for r in places])
+    gaps = np.array([float(round_gap(tuple(r), tuple(span), radius)) for r in places])
     r, a = places.astype(np.float64), span.astype(np.float64)
     share = np.clip(r @ a / (a @ a), 0.0, 1.0)[:, None] if a.any() else 0.0
     exact = np.linalg.norm(r - share * a, axis=1) - float(radius)
