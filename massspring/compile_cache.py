@@ -45,7 +45,7 @@ _ready: set[str] = set()
 """Cache folders that this process has made, or has found to be writable."""
 
 
-class ByMeaning(caching.UserProvidedCacheLocator):
+class BySource(caching.UserProvidedCacheLocator):
     """numba's locator for functions of this distribution: a folder for each state of the code of a module."""
 
     def __init__(self, py_func: Callable[..., Any], py_file: str) -> None:
@@ -70,14 +70,14 @@ class ByMeaning(caching.UserProvidedCacheLocator):
         return ""
 
     @classmethod
-    def from_function(cls, py_func: Callable[..., Any], py_file: str) -> "ByMeaning | None":
+    def from_function(cls, py_func: Callable[..., Any], py_file: str) -> "BySource | None":
         """None for functions of other packages: numba's default locators serve those."""
         if own_file(py_func.__module__) is None:
             return None
         return super().from_function(py_func, py_file)  # pyright: ignore[reportReturnType]
 
 
-LOCATORS = f"{__name__}.{ByMeaning.__name__}"
+LOCATORS = f"{__name__}.{BySource.__name__}"
 OTHERS = ",".join(locator.__name__ for locator in caching.CacheImpl._locator_classes)
 
 

@@ -1,17 +1,13 @@
 """The state of the code as one number: a result, a mesh or compiled code is current while the number stays the same.
 
-The number of a module covers its own syntax tree, without docstrings, and those of all own modules that it imports,
-directly or through others. So an edit makes stale only what can depend on it, and new words make nothing
-stale.
+The number of a module covers the bytes of its file, and of the files of all own modules that it imports, directly or
+through others. So an edit makes stale only what can depend on it.
 """
 
 import ast
 import hashlib
-import json
 import os
-import tempfile
 from collections.abc import Iterator
-from contextlib import suppress
 from functools import cache
 from pathlib import Path
 from typing import NamedTuple
@@ -34,8 +30,8 @@ ROOT = Path(__file__).parents[1]
 class Source(NamedTuple):
     """The content of a module, read from its text."""
 
-    meaning: str
-    """SHA-256 of its syntax tree without docstrings (hex)."""
+    digest: str
+    """SHA-256 of its file (hex)."""
     imports: list[tuple[str, str]]
     """(module, name) of each name that is imported; an empty name for the module itself."""
     exports: dict[str, str]
@@ -49,24 +45,14 @@ def source_fingerprint(*modules: str, within: tuple[str, ...] = OWN) -> str:
     Read once per process: a running process computes with the code that it has loaded.
     Raises MassSpringError for a module that does not exist, or is no Python.
     """
-    digest = hashlib.sha256()
-    for name, meaning in sorted(source_hashes(*modules, within=within).items()):
-        digest.update(f"{name}\0{meaning}\0".encode())
-    return digest.hexdigest()
-
-
-def source_hashes(*modules: str, within: tuple[str, ...] = OWN) -> dict[str, str]:
-    """The hash of each module that `source_fingerprint` covers, by dotted name. Raises the same."""
     sources: dict[str, Source] = {}
     waiting = list(modules)
     while waiting:
         name = waiting.pop()
-        if name in sources:
-            continue
-        sources[name] = _source(name)
-        waiting += [other for other in _followed(name) if _counts(other, within)]
-    _memory().keep()
-    return {name: source.meaning for name, source in sources.items()}
+        if name not in sources:
+            sources[name] = _source(name)
+            waiting += [other for other in _followed(name) if _counts(other, within)]
+    return hashlib.sha256("".join(f"{name}\0{sources[name].digest}\0" for name in sorted(sources)).encode()).hexdigest()
 
 
 def own_file(module: str) -> Path | None:
@@ -128,51 +114,8 @@ def _source(module: str) -> Source:
     file = own_file(module)
     if file is None:
         raise MassSpringError(f"there is no module {module!r} in {', '.join(OWN)}: its state cannot be known")
-    return _memory().get(module, file)
-
-
-class _Memory:
-    """The cache of `Source` entries, by the hash of the bytes of a file: parsing all files takes a second."""
-
-    def __init__(self, path: Path) -> None:
-        self.path = path
-        self.grown = False
-        self.entries: dict[str, list] = {}
-        with suppress(OSError, ValueError):
-            stored = json.loads(path.read_text(encoding="utf-8"))
-            self.entries = stored if isinstance(stored, dict) and len(stored) < MOST else {}
-
-    def get(self, module: str, file: Path) -> Source:
-        content, stub = file.read_bytes(), _stub(module)
-        public = stub.read_bytes() if stub.is_file() else b""
-        key = hashlib.sha256(f"{VERSION} {module} {file.name}\0".encode() + content + public).hexdigest()
-        if key not in self.entries:
-            self.entries[key] = list(read_source(content, module, file, public))
-            self.grown = True
-        meaning, imports, exports = self.entries[key]
-        return Source(meaning, [(pair[0], pair[1]) for pair in imports], exports)
-
-    def keep(self) -> None:
-        """Writes the cache, whole or not at all; where it cannot be, the next process parses all files again."""
-        if not self.grown:
-            return
-        self.grown = False
-        with suppress(OSError):
-            self.path.parent.mkdir(parents=True, exist_ok=True)
-            with tempfile.NamedTemporaryFile("w", dir=self.path.parent, suffix=".part", delete=False) as part:
-                json.dump(self.entries, part)
-            os.replace(part.name, self.path)
-
-
-VERSION = 2
-"""Of the entries in the cache."""
-MOST = 20_000
-"""Entries of the cache; with more it starts empty, since most belong to old versions."""
-
-
-@cache
-def _memory() -> _Memory:
-    return _Memory(cache_folder() / "sources.json")
+    stub = _stub(module)
+    return read_source(file.read_bytes(), module, file, stub.read_bytes() if stub.is_file() else b"")
 
 
 def cache_folder() -> Path:
@@ -193,8 +136,7 @@ def read_source(content: bytes, module: str, file: Path, stub: bytes = b"") -> S
     imports = sorted(set(_imports(tree, package)))
     public = _imports(ast.parse(stub), package)
     exports = {name: origin for origin, name in (*imports, *public) if name}
-    _drop_docstrings(tree)
-    return Source(hashlib.sha256(ast.dump(tree).encode()).hexdigest(), imports, exports)
+    return Source(hashlib.sha256(content).hexdigest(), imports, exports)
 
 
 def _imports(tree: ast.AST, package: str) -> Iterator[tuple[str, str]]:
@@ -208,19 +150,5 @@ def _imports(tree: ast.AST, package: str) -> Iterator[tuple[str, str]]:
             above = package.rsplit(".", node.level - 1)[0] if node.level else ""
             module = ".".join(filter(None, (above, node.module)))
             yield from ((module, alias.name) for alias in node.names)
-        else:
+        elif not isinstance(node, ast.expr):
             yield from _imports(node, package)
-
-
-def _drop_docstrings(tree: ast.AST) -> None:
-    """Removes strings that are statements: docstrings, and those below a field or a constant."""
-    for node in ast.walk(tree):
-        for name in ("body", "orelse", "finalbody"):
-            block = getattr(node, name, None)
-            if isinstance(block, list):
-                setattr(node, name, [statement for statement in block if not _is_remark(statement)])
-
-
-def _is_remark(statement: ast.stmt) -> bool:
-    value = statement.value if isinstance(statement, ast.Expr) else None
-    return isinstance(value, ast.Constant) and isinstance(value.value, str)

@@ -35,13 +35,7 @@ from massspring.kernels.contact.face_pairs import less_of_pairs, less_of_pairs_i
 from massspring.kernels.jit.decorators import compiled, njit_inlined, njit_lean
 from massspring.kernels.jit.stage_clock import VOLUME, end_stage
 from massspring.kernels.points.arrays import PointRows
-from massspring.kernels.step.begin import (
-    begin_step,
-    begin_summed_step,
-    count_iterations,
-    open_frame,
-    search_contacts,
-)
+from massspring.kernels.step.begin import begin_step, begin_summed_step, count_iterations, open_frame, search_contacts
 from massspring.kernels.step.end import end_step
 from massspring.kernels.step.touching_faces import begin_pairs, contacts_stand, search_pairs
 from massspring.layout.allocate import start

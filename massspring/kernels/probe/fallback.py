@@ -14,7 +14,7 @@ from massspring.kernels.jit.vec3 import add_to, dot, minus, over, plus, put, row
 from massspring.kernels.probe.arrays import CARRIED, CARRYING, LEFT_BEHIND
 from massspring.kernels.probe.broad_phase import ROOM, find_near
 from massspring.kernels.probe.contacts import clear_push
-from massspring.kernels.probe.motion import carried_speed, gather, move, tip_way
+from massspring.kernels.probe.motion import carried_speed, gather, move
 from massspring.kernels.probe.pressure import answer_into, faster_by, prepare, pressed_on
 from massspring.kernels.probe.search import look
 
@@ -57,7 +57,8 @@ def overshoot(stage, p, n):
         shift = minus(shift, times(b, row(probes.velocity, i)))
     if free < FREE_SHARE:
         return False
-    shift = plus(shift, over(tip_way(stage.tips, stage.step, p), stage.dt))
+    way = minus(row(probes.pair.tip, 1), row(probes.pair.tip, 0))
+    shift = plus(shift, over(way, stage.dt))
     length = math.sqrt(dot(shift, shift))
     if not length > 0.0:
         return False

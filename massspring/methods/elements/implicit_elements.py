@@ -31,13 +31,7 @@ from massspring.kernels.jit.stage_clock import BETWEEN_FRAMES, end_stage
 from massspring.layout.allocate import CORRECTION_LIMIT, start
 from massspring.layout.state import State
 from massspring.methods.capabilities import Capabilities, No
-from massspring.methods.elements.laws import (
-    ELEMENT_LAWS,
-    LawName,
-    has_nodal_volumes,
-    supported,
-    why_not_corotated,
-)
+from massspring.methods.elements.laws import ELEMENT_LAWS, LawName, has_nodal_volumes, supported, why_not_corotated
 from massspring.methods.elements.newton import Ending, NewtonStep, Prepared, missing
 from massspring.methods.elements.tangent import Pattern, elements_of
 from massspring.methods.families.pressure_law import check_modulus

@@ -3,10 +3,8 @@
 import numpy as np
 import pytest
 
-from massspring import MassSpringError, surface_body
-from massspring.body.axis import AXES, closest_virtual_node, virtual_nodes
-from massspring.body.springs import SpringKind
-from tests.massspring.conftest import SOFT, icosphere
+from massspring.body.axis import AXES, virtual_nodes
+from tests.massspring.conftest import icosphere
 
 RADIUS, TUBE, SPACING = 0.10, 0.03, 0.015
 """Half a ring [m]: radius of its centre line, radius of its blunt tube, spacing of the virtual nodes."""
@@ -68,33 +66,3 @@ def test_the_axis_moves_with_the_body(axis):
     still = virtual_nodes(points, triangles, SPACING, axis) @ turn.T + 0.2
     # A principal direction has no sign: the same nodes, perhaps from the other end.
     assert min(np.abs(moved - still).max(), np.abs(moved[::-1] - still).max()) < 1e-9
-
-
-def test_inner_springs_of_a_bent_body_are_no_longer_than_its_tube():
-    points, triangles = half_ring()
-    longest = {}
-    for axis in AXES:
-        body = surface_body(points, triangles, SOFT, axis)
-        longest[axis] = body.springs.rest_length[body.springs.kind == SpringKind.INNER].max()
-    # The blunt ends lie up to √2 tube radii and the last gap from the line's last node.
-    assert longest["centre_line"] < 2 * TUBE
-    assert longest["straight"] > 1.5 * longest["centre_line"]
-
-
-def test_every_virtual_node_is_used_or_left_out():
-    points, triangles = half_ring()
-    body = surface_body(points, triangles, SOFT, "centre_line")
-    virtual = body.rest[len(points) :]
-    assert set(closest_virtual_node(points, virtual)) == set(range(len(virtual)))
-
-
-def test_an_unknown_axis_is_refused():
-    with pytest.raises(MassSpringError, match="unknown axis 'curly'; known: straight, centre_line"):
-        surface_body(*icosphere(1), SOFT, "curly")
-
-
-def test_a_centre_line_needs_one_part():
-    points, triangles = icosphere(1)
-    two = np.vstack([points, points + 1.0]), np.vstack([triangles, triangles + len(points)])
-    with pytest.raises(MassSpringError, match="separate parts"):
-        virtual_nodes(*two, SPACING, "centre_line")

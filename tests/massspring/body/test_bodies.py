@@ -1,20 +1,14 @@
-"""Bodies: mass, springs, stiffness laws, and what is refused."""
+"""Bodies: mass, springs, smallest volume ratios, and what is refused."""
 
 import numpy as np
 import pytest
 
-from massspring import (
-    Body,
-    MassSpringError,
-    Material,
-    membrane_body,
-    quadratic_body,
-    surface_body,
-    tetrahedral_body,
-)
-from massspring.body.axis import principal_axis
+from massspring import Body, MassSpringError, membrane_body, quadratic_body, surface_body, tetrahedral_body
+from massspring.body.points import FAR
 from massspring.body.springs import SpringKind
+from massspring.body.volumes import tetrahedron_volumes
 from tests.massspring.conftest import SOFT, block, icosphere
+from tests.massspring.quadratic import bodies, second_order
 
 EXACT = 1e-12
 
@@ -48,20 +42,6 @@ def test_affine_shear_costs_half_mu_gamma_squared(law):
     assert np.mean(moduli) == pytest.approx(SOFT.shear_modulus, rel=0.045)
 
 
-def test_van_gelder_is_trace_exact_for_uniform_dilatation():
-    """U = ½ Σ k (ε L)² = ½ ε² · 6 V E/… : Σ k L² = E Σ_t 6 V_t, whatever the mesh."""
-    body = tetrahedral_body(*block((3, 2, 2)), SOFT, "van_gelder")
-    volumes = np.zeros(body.springs.count)
-    edges = {tuple(sorted(e)): n for n, e in enumerate(body.springs.ends.tolist())}
-    for nodes, volume in zip(body.tetrahedra.tolist(), body.tetrahedron_volumes, strict=True):
-        for a in range(4):
-            for b in range(a):
-                volumes[edges[tuple(sorted((nodes[a], nodes[b])))]] += volume
-    young = body.springs.stiffness * body.springs.rest_length**2 / volumes
-    assert np.ptp(young) < 1e-9 * young.mean()
-    assert young.mean() == pytest.approx(2.5 * SOFT.shear_modulus, rel=EXACT)
-
-
 def test_a_surface_body_is_built_as_in_the_paper(ball_body):
     """Euler: 3(n − 2) edges; a bending spring per edge but for those that are edges; one inner spring per node."""
     surface = len(ball_body.surface_nodes)
@@ -73,26 +53,6 @@ def test_a_surface_body_is_built_as_in_the_paper(ball_body):
     assert kinds[SpringKind.INNER] == surface
     assert kinds[SpringKind.AXIAL] == virtual - 1
     assert len(np.unique(np.sort(ball_body.springs.ends, axis=1), axis=0)) == ball_body.springs.count
-
-
-def test_inner_springs_go_to_the_closest_virtual_node(ball_body):
-    inner = ball_body.springs.ends[ball_body.springs.kind == SpringKind.INNER].astype(int)
-    virtual = ball_body.rest[len(ball_body.surface_nodes) :]
-    distance = np.linalg.norm(ball_body.rest[inner[:, 0], None] - virtual[None], axis=2)
-    assert np.allclose(
-        distance.min(axis=1), np.linalg.norm(ball_body.rest[inner[:, 0]] - ball_body.rest[inner[:, 1]], axis=1)
-    )
-
-
-def test_the_dominant_axis_is_the_long_one():
-    points, triangles = icosphere(2)
-    turn, _ = np.linalg.qr(np.random.default_rng(2).normal(size=(3, 3)))
-    stretched = (points * [1.0, 1.0, 2.5]) @ turn.T
-    _, direction = principal_axis(stretched)
-    assert abs(direction @ turn[:, 2]) == pytest.approx(1.0, abs=1e-6)
-    body = surface_body(stretched, triangles if np.linalg.det(turn) > 0 else triangles[:, ::-1], SOFT)
-    virtual = body.rest[len(points) :]
-    assert np.linalg.norm(np.cross(virtual - virtual[0], turn[:, 2]), axis=1).max() < 1e-6 * body.size
 
 
 def changed(body: Body, **parts: object) -> Body:
@@ -190,14 +150,48 @@ def test_a_spring_without_length_is_refused(block_body):
         changed(block_body, springs=replace(block_body.springs, rest_length=length))
 
 
-@pytest.mark.parametrize(
-    "values", [{"shear_modulus": -1.0, "density": 1000.0}, {"shear_modulus": 1.0, "density": np.nan}]
-)
-def test_bad_materials_are_refused(values):
-    with pytest.raises(MassSpringError, match="positive finite"):
-        Material(**values)
+SHEARED = np.array([[1.1, 0.2, 0.0], [-0.1, 0.95, 0.1], [0.05, 0.0, 1.2]])
+MIRRORED = np.diag([1.0, 1.0, -1.0])
+EDGE = 0.02
 
 
-def test_an_unknown_law_is_refused():
-    with pytest.raises(MassSpringError, match="unknown stiffness law"):
-        tetrahedral_body(*block((1, 1, 1)), SOFT, "stiff")
+@pytest.fixture(params=["block_body", *bodies()])
+def solid(request):
+    return bodies()[request.param] if request.param in bodies() else request.getfixturevalue(request.param)
+
+
+@pytest.mark.parametrize("map_", [np.eye(3), SHEARED, MIRRORED], ids=["rest", "sheared", "mirrored"])
+def test_a_linear_map_has_its_determinant_everywhere(solid, map_):
+    assert solid.smallest_ratio(solid.rest @ map_.T) == pytest.approx(np.linalg.det(map_), rel=1e-9)
+
+
+def test_the_smallest_counts(solid):
+    """One node moved: some elements lose volume, others gain it."""
+    x = solid.rest.copy()
+    x[np.argmin(np.linalg.norm(x - x.mean(axis=0), axis=1))] += 0.1 * EDGE
+    assert solid.smallest_ratio(x) < 1.0 - 1e-3
+
+
+@pytest.mark.filterwarnings("ignore:invalid value encountered in det")
+def test_no_number_is_seen(solid):
+    x = solid.rest.copy()
+    x[-1, 1] = np.nan
+    assert np.isnan(solid.smallest_ratio(x))
+
+
+def test_a_surface_has_no_elements(ball_body):
+    assert np.isnan(ball_body.smallest_ratio(ball_body.rest))
+
+
+def test_a_quadratic_element_is_read_at_its_points():
+    """x → x + a (x/L − 1)² L has J = 1 + 2a (x/L − 1): negative at three corners, 1 − 1.5 a in the flat parts between
+    its nodes there, and positive at its points, where springs and volumes see it."""
+    a = 0.55
+    points, cells = second_order(EDGE * np.vstack([np.zeros(3), np.eye(3)]), np.arange(4)[None])
+    body = quadratic_body(points, cells, SOFT)
+    x = points.copy()
+    x[:, 0] += a * EDGE * (points[:, 0] / EDGE - 1.0) ** 2
+    at_points, in_parts = 1.0 + 2.0 * a * (FAR - 1.0), 1.0 - 1.5 * a
+    assert body.smallest_ratio(x) == pytest.approx(at_points, rel=1e-9)
+    parts = tetrahedron_volumes(x, body.tetrahedra) / body.tetrahedron_volumes
+    assert parts.min() == pytest.approx(in_parts, rel=1e-9) and 1.0 - 2.0 * a < 0.0 < at_points < in_parts

@@ -6,26 +6,10 @@ import numpy as np
 import pytest
 from scipy.sparse.csgraph import connected_components
 
-from massspring import (
-    Body,
-    Clock,
-    ImplicitVolume,
-    MassSpringError,
-    Ramp,
-    Setup,
-    Volumes,
-    tetrahedral_body,
-)
+from massspring import Body, MassSpringError, Volumes, tetrahedral_body
 from massspring.body.partition import cell_graph, node_patches, partition
 from massspring.body.volumes import PATCH
 from tests.massspring.conftest import SOFT, block, hollow_block
-
-
-def test_regions_are_made_of_their_tetrahedra(block_body):
-    region = partition(block_body.rest, block_body.tetrahedra.astype(int), block_body.tetrahedron_volumes, 7)
-    volumes = np.bincount(region, weights=block_body.tetrahedron_volumes)
-    assert np.allclose(Volumes.regions(block_body, 7).measure(block_body.rest), volumes, rtol=1e-12)
-    assert volumes.sum() == pytest.approx(block_body.volume, rel=1e-12)
 
 
 @pytest.mark.parametrize("hollow", [False, True], ids=["block", "hollow"])
@@ -127,43 +111,10 @@ def test_bad_volumes_are_refused_in_one_sentence(hollow_body, name):
     assert "\n" not in str(caught.value)
 
 
-def test_a_surface_body_has_no_regions(ball_body):
-    for build in (Volumes.nodal, lambda b: Volumes.regions(b, 4)):
-        with pytest.raises(MassSpringError, match="the body has none; fill its mesh"):
-            build(ball_body)
-
-
 def test_a_body_whose_sheets_do_not_fit_its_tetrahedra_is_refused():
     points, _, tetrahedra, _ = hollow_block()
     with pytest.raises(MassSpringError, match="but the tetrahedra fill"):
         tetrahedral_body(points, outer_triangles(), tetrahedra, SOFT)
-
-
-def test_volumes_of_another_body_are_refused(block_body, hollow_body):
-    with pytest.raises(MassSpringError, match="names a node beyond"):
-        block_body.keeping(Volumes.nodal(hollow_body))
-
-
-@pytest.mark.parametrize(
-    ("targets", "words"),
-    [
-        ({"lumn": Ramp()}, "'lumn' names no kept volume; the body keeps wall, lumen"),
-        ({"lumen": Ramp((0.0, 1.0), (1.0, 0.0))}, "'lumen' falls to 0 of its rest volume"),
-    ],
-    ids=["unknown", "empty"],
-)
-def test_bad_targets_are_refused(hollow_body, targets, words):
-    with pytest.raises(MassSpringError, match=words):
-        Setup(hollow_body, ImplicitVolume(), Clock(0.01, 1, 10), targets=targets)
-
-
-@pytest.mark.parametrize(
-    ("times", "values", "words"),
-    [((0.0, 1.0), (1.0,), "one each"), ((0.0,), (float("nan"),), "not finite"), ((1.0, 0.0), (1.0, 1.0), "ascend")],
-)
-def test_bad_ramps_are_refused(times, values, words):
-    with pytest.raises(MassSpringError, match=words):
-        Ramp(times, values)
 
 
 def test_patches_are_connected_sums_of_nodal_volumes(block_body):

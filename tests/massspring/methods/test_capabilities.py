@@ -2,7 +2,6 @@
 sentence; and docs/methods.md says the same."""
 
 from dataclasses import replace
-from itertools import combinations
 from pathlib import Path
 
 import numpy as np
@@ -25,12 +24,12 @@ from massspring import (
     simulate,
     tetrahedral_body,
 )
-from massspring.methods.capabilities import Capabilities, No
+from massspring.methods.capabilities import Capabilities
 from studies.report.methods_page import OPTIONS, methods_page
 from tests.massspring.conftest import SOFT, block, body_of, hollow_block, icosphere
 from tests.massspring.methods.test_methods import clock_for
 from tests.massspring.quadratic import quadratic_block
-from tests.massspring.rows import CONTESTANTS, KINDS, SUPPORTED, by_pairs, kinds_of, recovers
+from tests.massspring.rows import CONTESTANTS, KINDS, SUPPORTED, recovers
 
 EACH = pytest.mark.parametrize("method", CONTESTANTS.values(), ids=CONTESTANTS.keys())
 MANY, NO_TETRAHEDRA = "it keeps one volume, the body keeps", "the body has none; fill its mesh"
@@ -161,36 +160,11 @@ def test_every_method_supports_friction(method, request):
     assert drag[2] < 0 and 0.05 * -drag[2] < drag[0] <= 0.5 * -drag[2] * (1 + 1e-9)
 
 
-@pytest.mark.parametrize(("options", "exclude"), [(("",), ()), ((10.0, 1e6), ()), ("abc", [("nodal", "c")])])
-def test_every_pair_meets(options, exclude):
-    """Against the product of all that goes together, pair by pair; far fewer rows where there are options."""
-    product = {
-        (name, kind, precision, option)
-        for name, method in CONTESTANTS.items()
-        for kind in kinds_of(method)
-        for precision in (("float64", "float32") if method.capabilities.float32 else ("float64",))
-        for option in options
-        if (kind, option) not in exclude
-    }
-    met = set(by_pairs(options, exclude))
-    assert met <= product and len(met) <= (1.0 if len(options) == 1 else 0.85) * len(product)
-    for a, b in combinations(range(4), 2):
-        assert {(row[a], row[b]) for row in product} == {(row[a], row[b]) for row in met}
-
-
 def test_every_capability_has_a_request_here():
     assert set(OPTIONS) == set(REQUESTS) | {name for names in NEEDED.values() for name in names}
     assert set(KINDS) <= set(REFUSED)
     for keeps, kinds in SUPPORTED.items():
         assert set(kinds) == {kind for kind in KINDS if keeps not in REFUSED[kind]}
-
-
-def test_a_no_is_false_and_says_why():
-    assert not No("it has no time")
-    for method in CONTESTANTS.values():
-        for name in OPTIONS:
-            supported = getattr(method.capabilities, name)
-            assert supported is True or (isinstance(supported, No) and supported.because[-1] != ".")
 
 
 def test_settings_that_support_something_else_say_so_for_themselves_alone():

@@ -8,13 +8,13 @@ from typing import ClassVar
 import numpy as np
 import pytest
 
-from massspring import Attachment, Body, Clock, Free, Method, Plane, Ramp, Setup, Trajectory, simulate
+from massspring import Body, Clock, Free, Method, Plane, Ramp, Setup, Trajectory, simulate
 from massspring.methods.capabilities import Capabilities
 from massspring.methods.method import begin_frame
 from massspring.world.targets import fastest_filling
 from tests.massspring.conftest import body_of
+from tests.massspring.methods.test_implicit_volume import start_of
 from tests.massspring.methods.test_methods import clock_for, squeeze
-from tests.massspring.methods.test_stress import start_of
 from tests.massspring.rows import CONTESTANTS, by_pairs, marks_of, recovers
 
 FRAMES = 10
@@ -187,13 +187,6 @@ def test_an_obstacle_that_loses_its_place_stops_the_run(case):
     path = Broken(until=LOST_AFTER * clock.frame)
     below = Plane((0, 0, case.body.rest[:, 2].min()), (0, 0, 1), path)
     stops(case.setup(clock, obstacles=(below,), damping=20.0), "obstacle 0 is no longer finite", 3)
-
-
-@guard()
-def test_an_attachment_that_loses_its_place_stops_the_run(case):
-    clock = clock_for(case.body, FRAMES, 10, method=case.method)
-    held = Attachment(np.array([0]), Broken(until=LOST_AFTER * clock.frame))
-    stops(case.setup(clock, attachments=(held,)), "attachment 0 is no longer finite", 3)
 
 
 @pytest.mark.filterwarnings("ignore:overflow:RuntimeWarning", "ignore:invalid:RuntimeWarning")

@@ -1,5 +1,6 @@
-"""A body that is cut during a run: what the swap keeps, and where the pieces go."""
+"""A body that is cut during a run: what the swap keeps, where the pieces go; an opened lumen."""
 
+import itertools
 from dataclasses import replace
 
 import numpy as np
@@ -12,19 +13,24 @@ from massspring import (
     Event,
     ImplicitVolume,
     MassSpringError,
+    Ramp,
     Setup,
     Trajectory,
     Volumes,
     make_clock,
+    quadratic_body,
     simulate,
     step_limit,
 )
 from massspring.body.opening import opened, parents
+from massspring.body.partition import tetrahedron_faces
 from massspring.body.points import PointVolumes
+from massspring.body.quadratic import boundary_facets
+from massspring.kernels.forces.springs import spring_forces_into
 from massspring.run.events import Easing
 from massspring.run.history import passage
 from massspring.run.stages import stages_of
-from tests.massspring.conftest import block, boundary
+from tests.massspring.conftest import SOFT, block, boundary, hollow_block
 from tests.massspring.cuts import CELLS, body_of_cells, layer_faces
 from tests.massspring.quadratic import second_order
 
@@ -154,60 +160,6 @@ def test_easing_runs_on_one_clock_to_nothing():
     assert not Easing(2.0, np.ones(3), 0.0).left(np.array([2.0])).any()
 
 
-def test_pieces_that_are_led_to_their_volumes_are_not_thrown_apart(monkeypatch):
-    """One volume, bisected while pulled hard: each piece is off its volume, and a step that corrects it all pops."""
-    energies = []
-    for left in (Easing.left, lambda self, t: np.zeros((len(t), len(self.off)))):
-        monkeypatch.setattr(Easing, "left", left)
-        cut = Cut("van_gelder nodal", np.inf, frames=240, at=120)
-        energies.append(simulate(cut.setup).kinetic[120:124].max())
-    assert energies[0] < 0.8 * energies[1]
-
-
-@pytest.mark.parametrize("kind", KINDS)
-def test_a_freed_piece_falls_as_a_point_does(kind):
-    cut = Cut(kind, np.inf, free=True, damping=0.0, gravity=(0.0, 0.0, -9.81), duration=0.12)
-    history = simulate(cut.setup, snapshots=range(1, 13))
-    assert history.outcome == "finished"
-    piece = np.unique(cut.opened[cut.points[cut.cells].mean(axis=1)[:, 0] > 0.04])
-    mass = cut.after.mass[piece]
-    centre = mass @ history.snapshots[:, piece].transpose(1, 0, 2).reshape(len(piece), -1) / mass.sum()
-    centre = centre.reshape(-1, 3)
-    falling = np.diff(centre[5:], n=2, axis=0)
-    # Constant acceleration in symplectic Euler: second differences over whole frames are exactly g t².
-    np.testing.assert_allclose(falling, np.tile([0, 0, -9.81 * cut.clock.frame**2], (len(falling), 1)), atol=1e-12)
-
-
-@pytest.mark.parametrize("kind", ["one", "quadratic"])
-def test_two_events_end_where_one_does(kind):
-    """Springs remember nothing: at rest the order in which faces opened does not matter."""
-    ends = []
-    for parts in (1, 2):
-        cut = Cut(kind, frames=60, at=20, duration=3.0, damping=60.0)
-        if parts == 2:
-            height = cut.points[cut.faces].mean(axis=1)[:, 2]
-            cells, body = cut.opened_along(cut.faces[height < np.median(height)])
-            events = (
-                cut.event(cut.before, cut.cells, body, cells, 10),
-                cut.event(body, cells, cut.after, cut.opened, 20),
-            )
-            cut.setup = replace(cut.setup, events=events)
-        history = simulate(cut.setup)
-        assert history.outcome == "finished" and history.kinetic[-1] < 1e-12
-        ends.append(history.final)
-    np.testing.assert_allclose(ends[0], ends[1], atol=1e-6 * cut.after.size)
-    assert np.linalg.norm(ends[0] - cut.after.rest, axis=1).max() > 0.5 * PULL
-
-
-@pytest.mark.parametrize("kind", KINDS)
-def test_a_body_cut_later_comes_to_rest_where_one_cut_before_does(kind):
-    cut = Cut(kind, frames=60, at=20, duration=3.0, damping=60.0)
-    later = simulate(cut.setup)
-    before = simulate(replace(cut.setup, body=cut.after, attachments=cut.held(cut.after), events=()))
-    np.testing.assert_allclose(later.final, before.final, atol=1e-6 * cut.after.size)
-    np.testing.assert_allclose(later.held_force[-1], before.held_force[-1], atol=1e-5 * np.abs(before.held_force).max())
-
-
 @pytest.mark.parametrize("method", [m for m in METHODS if m.capabilities.events], ids=lambda m: m.name)
 def test_an_event_that_changes_nothing_changes_nothing(method):
     """Bit for bit: a method that remembers more than places, speeds and pressures would differ."""
@@ -272,3 +224,235 @@ def test_an_event_that_pushes_would_be_seen():
     assert (pushed.energy, pushed.momentum, pushed.ns) == pytest.approx((3.0, 1.0, 7), rel=1e-9)
     lost = replace(start, nodes=start.nodes._replace(x=1.01 * start.nodes.x))
     assert passage(lost, cut.before, start, cut.before, 7).energy == pytest.approx(1.0, rel=1e-9)
+
+
+EXACT = ImplicitVolume(tolerance=1e-12, most_iterations=1000)
+ROWS = 20
+STRETCH = 1.1
+
+
+def body_alone(kind: str, points: np.ndarray, cells: np.ndarray) -> Body:
+    """The body that `kind` makes of cells in one piece."""
+    body = body_of_cells(points, cells, "cotangent" if kind == "cotangent" else "van_gelder")
+    return body.keeping(Volumes.nodal(body)) if kind == "van_gelder nodal" else body
+
+
+class Late(Cut):
+    """The block of test_events, its ends moved once it is in two parts."""
+
+    def held(self, body: Body) -> tuple[Attachment, ...]:
+        x, times = body.rest[:, 0], (0.0, 0.04, 0.1)
+        ends = ((x < 0.006, (-0.004, 0.003, 0.0)), (x > 0.074, (0.01, 0.0, 0.002)))
+        return tuple(
+            Attachment(np.flatnonzero(end), Trajectory(times, ((0.0,) * 3, (0.0,) * 3, there))) for end, there in ends
+        )
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_halves_that_move_apart_are_bodies_of_the_halves_alone(kind):
+    cut = Late(kind, np.inf, at=1)
+    history = simulate(replace(cut.setup, method=EXACT))
+    right = cut.points[cut.cells].mean(axis=1)[:, 0] > 0.04
+    for side, chosen in enumerate((~right, right)):
+        used, cells = np.unique(cut.opened[chosen], return_inverse=True)
+        half = body_alone(kind, cut.after.rest[used], cells.reshape(-1, cut.cells.shape[1]))
+        held = (cut.held(half)[side],)
+        alone = simulate(Setup(half, EXACT, cut.clock, attachments=held, damping=5.0))
+        assert np.abs(alone.final - half.rest).max() > 3e-3
+        np.testing.assert_allclose(history.final[used], alone.final, atol=1e-9 * cut.after.size)
+
+
+def slit(kind: str, cells_count: tuple[int, int, int], heights: list[int], flat: bool = False):
+    """Points and cells of a block, and of each height the cells of the block cut up to there, with their bodies and
+    events one frame after the other; a `flat` cut has no node off its plane."""
+    points, _, tetrahedra = block(cells_count)
+    middle = cells_count[0] // 2
+    if flat:
+        at = np.unravel_index(np.arange(len(points)), np.add(cells_count, 1))[0]
+        points[at == middle, 0] = 0.02 * middle
+    cells = tetrahedra
+    if kind == "quadratic":
+        points, cells = second_order(points, tetrahedra)
+    before = body_alone(kind, points, cells)
+    chain = [(cells, before)]
+    for height in heights:
+        opening = opened(cells, layer_faces(tetrahedra, cells_count, middle, height), len(points))
+        chain.append((opening.cells, body_alone(kind, points[opening.parent], opening.cells)))
+    return points, chain
+
+
+def events_of(chain: list, held) -> tuple[Event, ...]:
+    return tuple(
+        Event(after, parents(was, now), volumes_before(before, was, after, now), frame, held(after))
+        for frame, ((was, before), (now, after)) in enumerate(itertools.pairwise(chain), start=1)
+    )
+
+
+STRAIN = np.diag([1.0, STRETCH, 1.0 / STRETCH]) - np.eye(3)
+"""Along a slit whose normal is x: stress is the same everywhere, and with the pressure at rest none acts on it."""
+
+
+@pytest.mark.parametrize("kind", ["cotangent", "quadratic"])
+def test_plane_strain_along_a_slit_is_in_balance(kind):
+    """At every node but those of the outside, so at both copies of those of the slit."""
+    _, chain = slit(kind, (4, 4, 4), [3], flat=True)
+    (_, before), (_, after) = chain
+    x, pull = after.rest + after.rest @ STRAIN, np.empty_like(after.rest)
+    spring_forces_into(x, after.springs.ends, after.springs.rest_length, after.springs.stiffness, pull)
+    left = pull + (after.kept.jacobian(x).T @ after.rest_lam).reshape(-1, 3)
+    outer = before.rest[np.unique(before.triangles)]
+    inside = ~(after.rest[:, None] == outer).all(axis=2).any(axis=1)
+    assert inside[before.node_count :].sum() >= 6  # copies
+    assert np.abs(left[inside]).max() < 1e-12 * np.abs(pull).max()
+    assert np.abs(left[~inside]).max() > 1e-2 * np.abs(pull).max()  # what holds the outside
+
+
+@pytest.mark.parametrize("kind", ["one", "cotangent", "quadratic"])
+def test_twenty_events_end_where_one_does(kind):
+    """A cut that goes on row by row, and all of it at once."""
+
+    def held(body: Body) -> tuple[Attachment, ...]:
+        x, path = body.rest[:, 0], Trajectory((0.0, 0.06), ((0.0, 0.0, 0.0), (0.001, 0.0, 0.0)))
+        return Attachment(np.flatnonzero(x < 0.006)), Attachment(np.flatnonzero(x > 0.034), path)
+
+    ends = []
+    for heights in ([ROWS], list(range(1, ROWS + 1))):
+        _, chain = slit(kind, (2, 1, ROWS + 1), heights)
+        before, after = chain[0][1], chain[-1][1]
+        limit = step_limit(after)
+        clock = make_clock(3.0, 40, 0.5 * limit.damped, limit)
+        setup = Setup(before, EXACT, clock, attachments=held(before), damping=60.0)
+        history = simulate(replace(setup, events=events_of(chain, held)))
+        assert history.outcome == "finished" and history.min_j.min() > 0.2, history.message
+        ends.append(history.final)
+    np.testing.assert_allclose(ends[0], ends[1], atol=1e-6 * after.size)
+    parted = ends[0][np.arange(len(ends[0])) >= before.node_count]
+    assert len(parted) >= 2 * ROWS
+
+
+BOX, EDGE, FILLED = 4, 0.02, 1.15
+FILLED_KINDS = ("wall and lumen", "nodal", "quadratic")
+
+
+class Opened:
+    """A box with walls one cell thick, fixed at its bottom and filled, then cut through its lid from edge to edge."""
+
+    def __init__(self, kind: str, at: int = 20, frames: int = 60):
+        self.corners, _, cells, self.lumen = hollow_block(BOX, EDGE)
+        grid = np.round(self.corners / EDGE)
+        faces, _, second = tetrahedron_faces(cells)
+        faces = faces.astype(np.int64)
+        lid = (grid[faces][:, :, 0] == 2).all(axis=1) & (grid[faces][:, :, 2] >= 3).all(axis=1) & (second >= 0)
+        faces = faces[lid]
+        a, b, c = grid[faces].transpose(1, 0, 2)
+        turned = np.cross(b - a, c - a)[:, 0] < 0
+        faces[turned] = faces[turned][:, ::-1]
+        self.kind, self.corner_cells = kind, cells
+        points = self.corners
+        if kind == "quadratic":
+            points, cells = second_order(points, cells)
+        opening = opened(cells, faces, len(points))
+        self.points, self.cells, self.opening = points, cells, opening
+        self.before = self.body(points, cells, self.lumen)
+        self.after = self.body(points[opening.parent], opening.cells, None)
+        limit = step_limit(self.after)
+        count = self.after.kept.count
+        if kind == "quadratic":
+            volumes = parents(self.before.kept.corner_volume, self.after.kept.corner_volume)
+        else:
+            volumes = opening.parent if kind == "nodal" else np.zeros(count, dtype=int)
+        self.event = Event(
+            self.after, opening.parent, volumes, at, self.held(self.after), ended=(self.before.kept.count - 1,)
+        )
+        self.setup = Setup(
+            self.before,
+            ImplicitVolume(tolerance=1e-9, most_iterations=500),
+            make_clock(3.0, frames, 0.5 * limit.damped, limit),
+            attachments=self.held(self.before),
+            damping=30.0,
+            targets={"lumen": Ramp((0.0, 0.5), (1.0, FILLED))},
+            events=(self.event,),
+        )
+
+    def body(self, points, cells, lumen):
+        if self.kind == "quadratic":
+            return quadratic_body(points, cells, SOFT, None if lumen is None else self._facets(lumen))
+        body = body_of_cells(points, cells)
+        surfaces = {} if lumen is None else {"lumen": lumen}
+        if self.kind == "nodal":
+            nodal = Volumes.nodal(body)
+            return body.keeping(nodal.joined(Volumes.closed_surfaces(body, surfaces)) if surfaces else nodal)
+        return body.keeping(Volumes.closed_surfaces(body, {"wall": body.triangles, **surfaces}))
+
+    def _facets(self, lumen):
+        facets = boundary_facets(self.cells.astype(np.uint32)).astype(np.int64)
+        lumen_faces = {tuple(sorted(row)) for row in lumen.tolist()}
+        inner = [tuple(sorted(row)) in lumen_faces for row in facets[:, :3].tolist()]
+        return facets[inner][:, [0, 2, 1, 5, 4, 3]]
+
+    def held(self, body):
+        return (Attachment(np.flatnonzero(body.rest[:, 2] < 0.25 * EDGE)),)
+
+    def content(self, x: np.ndarray) -> float:
+        """Volume of the lumen [m³] of the positions `x` after the cut: its surface, and a lid over the gap."""
+        lumen_faces = {tuple(sorted(row)) for row in self.lumen.tolist()}
+        triangles = boundary(self.opening.cells[:, :4].astype(np.int64))
+        was = self.opening.parent[triangles]
+        inner = np.array([tuple(sorted(row)) in lumen_faces for row in was.tolist()])
+        inside = triangles[inner][:, ::-1]
+        half = inside[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
+        there = {tuple(row) for row in half.tolist()}
+        open_sides = [(a, b) for a, b in there if (b, a) not in there]
+        copy = dict(self.opening.pairs[:, ::-1].tolist()) | dict(self.opening.pairs.tolist())
+        assert open_sides
+        lids = []
+        for a, b in open_sides:
+            c, d = copy.get(b, b), copy.get(a, a)
+            if (a, b) < (d, c):  # each side of the gap once
+                lids += [row for row in ((b, a, d), (b, d, c)) if len(set(row)) == 3]
+        surface = np.concatenate([inside, np.array(lids)])
+        p, q, r = (x[corner] - x.mean(axis=0) for corner in surface.T)
+        return float(np.einsum("ij,ij->i", p, np.cross(q, r)).sum() / 6.0)
+
+
+def euler(triangles: np.ndarray) -> int:
+    edges = np.unique(np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1), axis=0)
+    return len(np.unique(triangles)) - len(edges) + len(triangles)
+
+
+def test_a_cut_through_the_wall_joins_its_two_surfaces():
+    cut = Opened("nodal")
+    assert euler(boundary(cut.corner_cells)) == 4
+    assert euler(boundary(cut.opening.cells.astype(np.int64))) == 2
+
+
+@pytest.mark.parametrize("kind", FILLED_KINDS)
+def test_the_content_goes_and_the_wall_keeps_its_volumes(kind):
+    cut = Opened(kind)
+    history = simulate(cut.setup, snapshots=(20, 60))
+    assert history.outcome == "finished", history.message
+    rest = cut.content(cut.after.rest)
+    assert rest == pytest.approx(
+        Volumes.closed_surfaces(cut.before, {"l": cut.lumen}).measure(cut.points)[0], rel=1e-12
+    )
+    full, empty = (cut.content(x) for x in history.snapshots)
+    flat = kind != "quadratic"  # its lumen has curved sides
+    assert full == pytest.approx(FILLED * rest, rel=1e-3 if flat else 1e-2)
+    # Nothing loads it then: it goes back to what it was, and its content with it.
+    assert empty == pytest.approx(rest, rel=1e-4)
+    np.testing.assert_allclose(history.final, cut.after.rest, atol=1e-4 * cut.after.size)
+    wall = history.volume.sum(axis=1)
+    np.testing.assert_allclose(wall, cut.after.rest_volumes.sum(), rtol=1e-4)
+    np.testing.assert_allclose(history.volume[-1], cut.after.rest_volumes, rtol=1e-4)
+    (passed,) = history.passages
+    assert passed.energy < 1e-12 and passed.momentum < 1e-12
+
+
+def test_volumes_that_cannot_end_are_refused():
+    cut = Opened("nodal")
+    count = cut.before.kept.count
+    for ended in ((count,), (count - 1, count - 1)):
+        with pytest.raises(MassSpringError, match=f"are not among the {count} before it, or one is given twice"):
+            replace(cut.setup, events=(replace(cut.event, ended=ended),))
+    with pytest.raises(MassSpringError, match=f"do not name all {count} before it"):
+        replace(cut.setup, events=(replace(cut.event, ended=()),))

@@ -35,7 +35,7 @@ SHOWN = {"studies.metrics.metrics", "studies.plots.laws", "studies.cli.app", "st
 def with_edit(monkeypatch, module: str, fingerprint) -> str:
     """The number after an edit of one module."""
     read = sources._source.__wrapped__
-    edited = lambda name: read(name)._replace(meaning="edited") if name == module else read(name)  # noqa: E731
+    edited = lambda name: read(name)._replace(digest="edited") if name == module else read(name)  # noqa: E731
     source_fingerprint.cache_clear()
     with monkeypatch.context() as changed:
         changed.setattr(sources, "_source", edited)

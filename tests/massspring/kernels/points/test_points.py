@@ -1,0 +1,131 @@
+"""Sums over points of blocked elements, against NumPy at positions far from rest."""
+
+import numpy as np
+import pytest
+from scipy.sparse import diags_array
+
+from massspring import Attachment, Body, Clock, ImplicitVolume, Setup, quadratic_body
+from massspring.body.points import PointVolumes
+from massspring.kernels.points.elements import measure_into, push_into
+from massspring.kernels.points.solve import apply_schur, precondition_into, solve_iteratively
+from massspring.layout.facet_rows import facet_rows, facet_rule
+from massspring.layout.point_rows import SHIFT
+from tests.massspring.conftest import SOFT
+from tests.massspring.quadratic import curved_block, hollow_ball, jiggled, local_force, quadratic_block
+
+CLOSE = 1e-12
+DT = 1e-3
+
+
+@pytest.fixture(params=["small", "curved", "hollow"])
+def body(request) -> Body:
+    """6 elements, fewer than a block; 54, not a multiple of it; 240 with a lumen."""
+    if request.param == "hollow":
+        return hollow_ball()
+    return quadratic_body(*(quadratic_block((1, 1, 1)) if request.param == "small" else curved_block((3, 3, 1))), SOFT)
+
+
+def prepared(body: Body, held=()):
+    """Volumes, rows, positions and the frame with nodes `held`; what depends on positions is measured."""
+    attachments = (Attachment(np.asarray(held)),) if len(held) else ()
+    setup = Setup(body, ImplicitVolume(), Clock(DT, 1, 1), (), attachments)
+    state = setup.start()
+    x = np.ascontiguousarray(jiggled(body, 0.05))
+    measure_into(state.rows, x, np.column_stack([x, np.zeros(len(x))]))
+    assert isinstance(body.kept, PointVolumes) and setup.inside.permutation is None
+    return body.kept, state.rows, x, state.frame(setup.boundary(0))
+
+
+def close(value, exact, bound=CLOSE):
+    assert np.abs(value - exact).max() < bound * np.abs(exact).max()
+
+
+def test_volumes_and_pushes_are_those_of_numpy(body):
+    volumes, rows, x, _ = prepared(body)
+    close(rows.volume, volumes.measure(x))
+    lam = np.random.default_rng(1).standard_normal(volumes.count) * SOFT.shear_modulus
+    push_into(rows, lam)
+    close(rows.push.ravel(), volumes.jacobian(x).T @ lam + local_force(body, x))
+
+
+def test_the_schur_complement_is_that_of_numpy_with_held_nodes(body):
+    held = np.arange(0, body.node_count, 5)
+    volumes, rows, x, frame = prepared(body, held)
+    inverse_mass = frame.model.inverse_mass
+    p, product = np.random.default_rng(3).standard_normal(volumes.count), np.zeros(volumes.count)
+    apply_schur(frame, rows, None, p, product)
+    j = volumes.jacobian(x)
+    close(product, j @ (diags_array(np.repeat(inverse_mass, 3)) @ (j.T @ p)))
+
+
+def test_the_preconditioner_is_the_inverse_at_rest(body):
+    """In single precision: six digits of the condition of S are left."""
+    held = np.arange(0, body.node_count, 7)
+    volumes, rows, _, frame = prepared(body, held)
+    inverse_mass = frame.model.inverse_mass
+    j = volumes.jacobian(body.rest)
+    schur = (j @ diags_array(np.repeat(inverse_mass, 3)) @ j.T).toarray()
+    assert np.allclose(rows.diagonal, np.diag(schur), rtol=1e-12)
+    shifted = schur + SHIFT * np.diag(np.diag(schur))
+    residual, product = np.random.default_rng(5).standard_normal(volumes.count), np.zeros(volumes.count)
+    rho = precondition_into(rows, residual, product)
+    assert rho == pytest.approx(float(residual @ product), rel=1e-12) and rho > 0.0
+    close(shifted @ product, residual, 1e-6 * np.linalg.cond(rows.inverse))
+
+
+def test_conjugate_gradients_solve_for_every_volume(body):
+    volumes, rows, x, frame = prepared(body)
+    inverse_mass = frame.model.inverse_mass
+    j = volumes.jacobian(x)
+    schur = (j @ diags_array(np.repeat(inverse_mass, 3)) @ j.T).toarray()
+    right = schur @ np.random.default_rng(6).standard_normal(volumes.count)
+    rows.right[:], rows.lam[:] = right, 0.0
+    rows.allowed[:] = 1e-9 * np.abs(right).max()
+    count = solve_iteratively(frame, rows, None, 200)
+    assert 0 < count < 60
+    assert np.abs(schur @ rows.lam - right).max() < 2e-9 * np.abs(right).max()
+
+
+def test_volumes_whose_nodes_are_all_held_are_left_out(body):
+    """They have nothing to push on: no pressure, no part in the iteration, and the others are solved for as before."""
+    volumes = prepared(body)[0]
+    assert isinstance(volumes, PointVolumes)
+    around = (volumes.corner_volume == 0).any(axis=1)
+    held = np.unique(volumes.cells[around])
+    _, rows, _, frame = prepared(body, held)
+    dead = rows.diagonal == 0.0
+    assert dead[0] and np.isfinite(rows.inverse).all() and (rows.scale[dead] == 0.0).all()
+    rows.right[:], rows.lam[:], rows.allowed[:] = 1.0, 3.0, 1e-9
+    if not dead.all():
+        assert solve_iteratively(frame, rows, None, 200) > 0
+    assert (rows.lam[dead] == 3.0).all() and np.isfinite(rows.lam).all()
+
+
+def test_the_rule_of_facets_is_exact_to_the_fourth_degree():
+    """∫ over a triangle of b_1^i b_2^j b_3^k is 2 i! j! k!/(i + j + k + 2)!, per area; and N is 1 at its own node."""
+    shape, weight = facet_rule()
+    assert np.allclose(shape.sum(axis=1), 1.0, atol=1e-14) and weight.sum() == pytest.approx(1.0, abs=1e-14)
+    assert np.allclose(weight @ shape, [0, 0, 0, 1 / 3, 1 / 3, 1 / 3], atol=1e-14)
+    # ∫ N_a N_b of six-node triangles (Zienkiewicz, Taylor): degree four.
+    mass = np.array(
+        [
+            [6, -1, -1, 0, -4, 0],
+            [-1, 6, -1, 0, 0, -4],
+            [-1, -1, 6, -4, 0, 0],
+            [0, 0, -4, 32, 16, 16],
+            [-4, 0, 0, 16, 32, 16],
+            [0, -4, 0, 16, 16, 32],
+        ]
+    )
+    assert np.allclose(shape.T @ (weight[:, None] * shape), mass / 180.0, atol=1e-14)
+
+
+def test_what_resists_at_a_contact_point_is_the_mass_of_its_nodes(body):
+    """A unit force at a point for a unit of time moves the point by 1/m_q (eq. 9.4); facets that are held have none."""
+    inverse_mass = 1.0 / body.mass
+    inverse_mass[body.contact_facets[0]] = 0.0
+    rows = facet_rows(body.contact_facets, body.rest, inverse_mass)
+    assert len(rows.node) == len(body.contact_facets) - (inverse_mass[body.contact_facets] == 0).all(axis=1).sum()
+    for f, nodes in enumerate(rows.node):
+        speed = inverse_mass[nodes] * rows.shape  # of each node under a force at each point
+        assert np.allclose((speed * rows.shape).sum(axis=1), 1.0 / rows.mass[f], rtol=1e-12)
