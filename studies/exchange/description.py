@@ -1,12 +1,12 @@
 """A scene as scene.json: all that another program needs, in SI units, as numbers and in words."""
 
 from collections.abc import Sequence
-from dataclasses import asdict
+from dataclasses import asdict, fields
 from typing import Any
 
 import numpy as np
 
-from massspring import Capsule, Obstacle, Plane, Sphere, Trajectory
+from massspring import Obstacle, Plane, Trajectory
 from studies.exchange.meshes import GivenMesh
 from studies.exchange.words import (
     DAMPING,
@@ -39,6 +39,7 @@ HELD, OUTER, LUMEN = "held_", "outer", "lumen"
 """Point data of the meshes: 1 at the nodes of a held region, of the outer surface, of the lumen's, else 0."""
 FILES = {"straight": "straight.vtu", "curved": "curved.vtu", "surface": "surface.vtu", "paths": "paths.csv"}
 CUT_FILES = {"straight": "cut_straight.csv", "curved": "cut_curved.csv"}
+BETTER = {"lower": "lower is better", "higher": "higher is better", "-": "nearer to 0 is better"}
 
 
 def judged_metrics(scene: Scene) -> list[Metric]:
@@ -50,6 +51,8 @@ def judged_metrics(scene: Scene) -> list[Metric]:
 
 def description(scene: Scene, meshes: Sequence[GivenMesh], why_not_curved: str) -> dict[str, Any]:
     """The content of scene.json, JSON-able."""
+    tissue, lumen, start = scene.tissue, scene.lumen, scene.start
+    moves = scene.reference is not None and scene.reference.dt is not None
     return {
         "schema": SCHEMA,
         "version": VERSION,
@@ -58,10 +61,16 @@ def description(scene: Scene, meshes: Sequence[GivenMesh], why_not_curved: str) 
         "units": {"length": "m", "time": "s", "mass": "kg", "force": "N", "pressure": "Pa"},
         "meshes": {mesh.kind: mesh_entry(mesh) for mesh in meshes},
         "why_no_curved_mesh": why_not_curved,
-        "material": material(scene),
+        "material": {
+            "shear_modulus": tissue.shear_modulus,
+            "bulk_modulus": tissue.shear_modulus * tissue.bulk_over_shear,
+            "density": tissue.density,
+            "words": MATERIAL,
+            "source": tissue.source,
+        },
         "gravity": list(scene.gravity),
-        "damping": {"rate": scene.damping, "words": DAMPING_OF_MOTION if moves(scene) else DAMPING},
-        "start": {"words": start_words(scene), "speed": scene.start and scene.start.speed},
+        "damping": {"rate": scene.damping, "words": DAMPING_OF_MOTION if moves else DAMPING},
+        "start": {"words": start_words(scene), "speed": start and start.speed},
         "duration": scene.duration,
         "frames": scene.frames,
         "checkpoints": list(scene.checkpoints),
@@ -70,28 +79,23 @@ def description(scene: Scene, meshes: Sequence[GivenMesh], why_not_curved: str) 
         ],
         "obstacles": [obstacle_entry(obstacle) for obstacle in scene.obstacles],
         "paths": {"file": FILES["paths"], "words": PATHS},
-        "lumen": lumen_entry(scene),
+        "lumen": lumen
+        and {
+            "content": lumen.content,
+            "volume": {"times": list(lumen.filling.times), "factors": list(lumen.filling.values)},
+            "words": lumen_words(lumen),
+        },
         "cut": cut_entry(scene),
-        "force": {"of": scene.probed.what, "number": scene.probed.number, "direction": list(scene.probed.direction)}
-        | {"words": force_words(scene)},
-        "judged": [metric_entry(metric) for metric in judged_metrics(scene)],
-    }
-
-
-def moves(scene: Scene) -> bool:
-    """Whether its reference is a motion."""
-    return scene.reference is not None and scene.reference.dt is not None
-
-
-def material(scene: Scene) -> dict[str, Any]:
-    """The tissue."""
-    tissue = scene.tissue
-    return {
-        "shear_modulus": tissue.shear_modulus,
-        "bulk_modulus": tissue.shear_modulus * tissue.bulk_over_shear,
-        "density": tissue.density,
-        "words": MATERIAL,
-        "source": tissue.source,
+        "force": {
+            "of": scene.probed.what,
+            "number": scene.probed.number,
+            "direction": list(scene.probed.direction),
+            "words": force_words(scene),
+        },
+        "judged": [
+            {"name": one.name, "unit": one.unit, "definition": one.description, "better": BETTER[one.better]}
+            for one in judged_metrics(scene)
+        ],
     }
 
 
@@ -115,26 +119,13 @@ def path_entry(path: Trajectory) -> dict[str, Any]:
 
 def obstacle_entry(obstacle: Obstacle) -> dict[str, Any]:
     """An obstacle as numbers by kind, and in words."""
-    entry: dict[str, Any] = {"kind": type(obstacle).__name__.lower(), "friction": getattr(obstacle, "friction", 0.0)}
+    shape = {one.name: getattr(obstacle, one.name) for one in fields(obstacle)}
+    entry = {"kind": type(obstacle).__name__.lower(), "friction": shape.pop("friction", 0.0)}
+    entry |= {name: list(value) if isinstance(value, tuple) else value for name, value in shape.items()}
     if isinstance(obstacle, Plane):
-        entry |= {"point": list(obstacle.point), "normal": obstacle.unit_normal.tolist()}
-    elif isinstance(obstacle, Sphere):
-        entry |= {"centre": list(obstacle.centre), "radius": obstacle.radius}
-    elif isinstance(obstacle, Capsule):
-        entry |= {"start": list(obstacle.start), "end": list(obstacle.end), "radius": obstacle.radius}
-    else:
-        entry |= {"tip": list(obstacle.tip), "radius": obstacle.radius}
+        entry["normal"] = obstacle.unit_normal.tolist()
     words = {"friction_words": friction_words(obstacle), "words": obstacle_words(obstacle)}
     return entry | {"path": path_entry(obstacle.path)} | words
-
-
-def lumen_entry(scene: Scene) -> dict[str, Any] | None:
-    """What fills a hollow organ; None for a solid one."""
-    lumen = scene.lumen
-    if lumen is None:
-        return None
-    filling = {"times": list(lumen.filling.times), "factors": list(lumen.filling.values)}
-    return {"content": lumen.content, "volume": filling, "words": lumen_words(lumen)}
 
 
 def cut_entry(scene: Scene) -> dict[str, Any] | None:
@@ -144,12 +135,5 @@ def cut_entry(scene: Scene) -> dict[str, Any] | None:
         return None
     blade = cut.within and {"kind": type(cut.within).__name__.lower()} | asdict(cut.within)
     plane = {"point": list(cut.plane.point), "normal": list(cut.plane.normal)}
-    return {"name": cut.name, "plane": plane, "within": blade, "contact": cut.contact, "files": CUT_FILES} | {
-        "words": cut_words(cut)
-    }
-
-
-def metric_entry(metric: Metric) -> dict[str, Any]:
-    """What a metric is."""
-    better = {"lower": "lower is better", "higher": "higher is better", "-": "nearer to 0 is better"}[metric.better]
-    return {"name": metric.name, "unit": metric.unit, "definition": metric.description, "better": better}
+    numbers = {"name": cut.name, "plane": plane, "within": blade, "contact": cut.contact}
+    return numbers | {"files": CUT_FILES, "words": cut_words(cut)}

@@ -12,7 +12,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from studies.base.atomic import write_whole
 from studies.base.errors import StudyError
 from studies.exchange.description import CUT_FILES, FILES, HELD, LUMEN, OUTER, description
-from studies.exchange.meshes import NODES, STRAIGHT, GivenMesh, given_meshes, given_scene
+from studies.exchange.meshes import NODES, GivenMesh, given_meshes, given_scene
 from studies.exchange.starter import NAME, SOLVER
 from studies.geometry.files.writing import write_grid_file
 from studies.geometry.mesh.organ_mesh import OrganMesh
@@ -41,35 +41,29 @@ def export(
     and a cut whose time matters.
     """
     scene = given_scene(scene)
-    check_folder(folder)
-    meshes, why_not = given_meshes(scene, nodes)
-    data = rounded(description(scene, meshes, why_not))
-    texts = {
-        DESCRIPTION: json.dumps(data, indent=1) + "\n",
-        README: PAGE.render(data, nodes=nodes, rows=rows),
-        NAME: SOLVER,
-    }
-    if (folder / NAME).is_file() and (folder / NAME).read_text(encoding="utf-8", errors="replace") != SOLVER:
-        del texts[NAME]
-    written = [_write_mesh(mesh, folder) for mesh in meshes]
-    written.append(_write_surface(meshes, folder / FILES["surface"]))
-    written += [_write_cut(mesh, folder / CUT_FILES[mesh.kind]) for mesh in meshes if scene.cut is not None]
-    written.append(folder / FILES["paths"])
-    write_whole(written[-1], paths_table(scene).to_csv(index=False, float_format=f"%.{DIGITS}g").encode())
-    for name, text in texts.items():
-        written.append(folder / name)
-        write_whole(written[-1], text.encode())
-    for name in {*FILES.values(), *CUT_FILES.values()} - {path.name for path in written}:
-        (folder / name).unlink(missing_ok=True)  # of an earlier export
-    return written, why_not
-
-
-def check_folder(folder: Path) -> None:
-    """Raises StudyError for a folder that is a file, and for one with other files than those of an export."""
     if folder.exists() and not folder.is_dir():
         raise StudyError(f"{folder} is a file; give the name of a folder")
     if folder.is_dir() and any(folder.iterdir()) and not (folder / DESCRIPTION).is_file():
         raise StudyError(f"{folder} holds other files; give a new folder, or one with an exported scene")
+    meshes, why_not = given_meshes(scene, nodes)
+    data = rounded(description(scene, meshes, why_not))
+    for mesh in meshes:
+        kind = "tetra10" if mesh.cells.shape[1] == 10 else "tetra"
+        write_grid_file(folder / FILES[mesh.kind], mesh.points, {kind: mesh.cells}, marks(mesh))
+    write_surface(meshes[0], folder / FILES["surface"])
+    texts = {CUT_FILES[mesh.kind]: facets_csv(mesh) for mesh in meshes if scene.cut is not None}
+    texts[FILES["paths"]] = paths_table(scene).to_csv(index=False, float_format=f"%.{DIGITS}g")
+    texts[DESCRIPTION] = json.dumps(data, indent=1) + "\n"
+    texts[README] = PAGE.render(data, nodes=nodes, rows=rows)
+    solver = folder / NAME
+    if not solver.is_file() or solver.read_text(encoding="utf-8", errors="replace") == SOLVER:
+        texts[NAME] = SOLVER
+    for name, text in texts.items():
+        write_whole(folder / name, text.encode())
+    written = [*(FILES[mesh.kind] for mesh in meshes), FILES["surface"], *texts]
+    for name in {*FILES.values(), *CUT_FILES.values()} - {*written}:
+        (folder / name).unlink(missing_ok=True)  # of an earlier export
+    return [folder / name for name in written], why_not
 
 
 def rounded(value: Any) -> Any:
@@ -79,12 +73,6 @@ def rounded(value: Any) -> Any:
     if isinstance(value, list | tuple):
         return [rounded(part) for part in value]
     return float(f"{value:.{DIGITS}g}") + 0.0 if isinstance(value, float) else value
-
-
-def _write_mesh(mesh: GivenMesh, folder: Path) -> Path:
-    path = folder / FILES[mesh.kind]
-    write_grid_file(path, mesh.points, {"tetra10" if mesh.cells.shape[1] == 10 else "tetra": mesh.cells}, marks(mesh))
-    return path
 
 
 def marks(mesh: GivenMesh) -> dict[str, np.ndarray]:
@@ -99,21 +87,18 @@ def marks(mesh: GivenMesh) -> dict[str, np.ndarray]:
     return {name: values.astype(np.int32) for name, values in masks.items()}
 
 
-def _write_surface(meshes: Sequence[GivenMesh], path: Path) -> Path:
-    (straight,) = [mesh for mesh in meshes if mesh.kind == STRAIGHT]
+def write_surface(straight: GivenMesh, path: Path) -> None:
     assert isinstance(straight.mesh, OrganMesh)  # linear
     count = straight.mesh.outer_count
     data = {name: values[:count] for name, values in marks(straight).items() if name.startswith(HELD)}
     write_grid_file(path, straight.points[:count], {"triangle": straight.mesh.outer_triangles}, data)
-    return path
 
 
-def _write_cut(mesh: GivenMesh, path: Path) -> Path:
+def facets_csv(mesh: GivenMesh) -> str:
+    """The facets of the cut in pairs: nodes behind it, and in front of it."""
     facets = mesh.cut_facets
     names = [f"{side}_{number}" for side in ("behind", "front") for number in range(facets.shape[2])]
-    table = pd.DataFrame(facets.reshape(len(facets), -1), columns=names)
-    write_whole(path, table.to_csv(index=False).encode())
-    return path
+    return pd.DataFrame(facets.reshape(len(facets), -1), columns=names).to_csv(index=False)
 
 
 def paths_table(scene: Scene) -> pd.DataFrame:

@@ -1,6 +1,6 @@
 """Descriptions of a scene in words, for readers who have never run this program."""
 
-from massspring import Capsule, Obstacle, Plane, Ramp, Sphere, Trajectory
+from massspring import Capsule, Obstacle, Plane, Sphere, Trajectory
 from studies.scene.cut import Cut
 from studies.scene.scene import Lumen, Scene
 
@@ -28,11 +28,6 @@ def moved(path: Trajectory) -> str:
     return "is displaced by " + ", ".join(keys) + "; linear in between"
 
 
-def ramped(ramp: Ramp) -> str:
-    """A factor over time in words."""
-    return ", ".join(f"{value:g} at {t:g} s" for t, value in zip(ramp.times, ramp.values, strict=True))
-
-
 def obstacle_words(obstacle: Obstacle) -> str:
     """What a rigid obstacle is, whether it has friction, and how it moves."""
     if isinstance(obstacle, Plane):
@@ -57,15 +52,15 @@ def friction_words(obstacle: Obstacle) -> str:
     return "frictionless" if friction == 0 else f"Coulomb friction with coefficient {friction:g}"
 
 
-def lumen_words(lumen: Lumen | None) -> str:
+def lumen_words(lumen: Lumen) -> str:
     """What fills a hollow organ."""
-    if lumen is None:
-        return "The organ is solid."
     if lumen.content == "open":
         return "The lumen is drained: its wall feels no pressure from inside."
     if set(lumen.filling.values) == {1.0}:
         return "The lumen is closed and full of an incompressible fluid without weight: its volume does not change."
-    return f"The lumen is closed; its volume is its volume at rest times {ramped(lumen.filling)}, linear in between."
+    keys = zip(lumen.filling.times, lumen.filling.values, strict=True)
+    factors = ", ".join(f"{value:g} at {t:g} s" for t, value in keys)
+    return f"The lumen is closed; its volume is its volume at rest times {factors}, linear in between."
 
 
 def cut_words(cut: Cut) -> str:
