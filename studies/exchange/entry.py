@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Callable, Iterable
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
@@ -75,24 +76,18 @@ def entry_name(case: Case) -> str:
     return f"{case.scene.name}-{mesh}-{case.body.nodes}-{case.method.name}"
 
 
-def case_of_entry(record: Record) -> Case:
-    """The case of an entry's record. Raises StudyError for a record that is none."""
-    if record.attributes.get(ENTRY) is None:
-        raise StudyError(f"'{record.name}' is not a result of another program")
-    data = json.loads(record.key)
-    recipe = BODIES[data["body"]["kind"]](int(data["body"]["nodes"]))
-    return Case(scene_of_key(record.key), recipe, outside(data["method"]["name"]))
-
-
 def run_of_entry(record: Record, reference: Reference | None) -> Run:
     """The run of an entry; reference: that of its scene, which for a cut scene may include checkpoints before the
-    cut."""
-    seconds = record.attributes.get(SECONDS)
+    cut. Raises StudyError for a record that is no entry."""
+    attributes = record.attributes
+    if attributes.get(ENTRY) is None:
+        raise StudyError(f"'{record.name}' is not a result of another program")
+    data, seconds = json.loads(record.key), attributes.get(SECONDS)
+    recipe = BODIES[data["body"]["kind"]](int(data["body"]["nodes"]))
+    case = Case(scene_of_key(record.key), recipe, outside(data["method"]["name"]))
     timing = None
     if seconds is not None:
-        frame_ns = 1e9 * seconds * record.attributes["frame"]
-        timing = FrameTiming(np.full((1, int(record.attributes["frames"])), frame_ns))
-    case = case_of_entry(record)
+        timing = FrameTiming(np.full((1, int(attributes["frames"])), 1e9 * seconds * attributes["frame"]))
     return Run(case, record, reference_of(case.scene, reference), timing)
 
 
@@ -106,28 +101,22 @@ def entries_beside(
 ) -> tuple[list[Run], list[str]]:
     """The entries in `scenes`, judged by the references of these; and what cannot be read, a sentence each. Scenes that
     differ only in the meshes of the reference or the number of frames count as the same."""
-    pairs = {_same(given): (given, scene) for scene in scenes for given in _given(scene)}
-    runs, problems = [], []
+    pairs, runs, problems = dict[str, tuple[Scene, Scene]](), [], []
+    for scene in scenes:
+        with suppress(StudyError):  # one that is not given away has no entry
+            given = given_scene(scene)
+            pairs[_same(given)] = given, scene
     for path in entry_files(root):
         try:
-            record = read_record(path)
-            run = run_of_entry(record, None)
+            run = run_of_entry(read_record(path), None)
         except StudyError as problem:
             problems.append(str(problem))
             continue
-        given, scene = pairs.get(_same(run.case.scene), (None, None))
-        if given is not None and scene is not None:
-            runs.append(
-                replace(run, case=run.case.replaced(scene=given), reference=reference_of(given, reference_for(scene)))
-            )
+        if (pair := pairs.get(_same(run.case.scene))) is not None:
+            given, scene = pair
+            case = run.case.replaced(scene=given)
+            runs.append(replace(run, case=case, reference=reference_of(given, reference_for(scene))))
     return runs, problems
-
-
-def _given(scene: Scene) -> list[Scene]:
-    try:
-        return [given_scene(scene)]
-    except StudyError:  # it was never exported
-        return []
 
 
 def _same(scene: Scene) -> str:

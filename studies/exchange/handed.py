@@ -2,12 +2,11 @@
 
 import re
 import xml.etree.ElementTree as ElementTree
-import zlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
-from zipfile import BadZipFile, is_zipfile
+from zipfile import is_zipfile
 
 import h5py
 import numpy as np
@@ -51,7 +50,7 @@ def read_handed(path: Path) -> Handed:
         return READERS[path.suffix.lower()](path)
     except StudyError:
         raise
-    except UNREADABLE as error:
+    except Exception as error:  # readers of damaged files, or of files of another kind, raise any exception
         reason = (str(error).splitlines() or [type(error).__name__])[0]
         raise StudyError(
             f"{path.name} cannot be read ({reason}); README.md of the scene describes what it must contain"
@@ -74,9 +73,9 @@ def _table(path: Path, columns: Sequence[str]) -> pd.DataFrame:
         if missing:
             raise StudyError(f"{path.name} lacks the column {missing[0]!r}; it needs {', '.join(columns)}")
         return pd.DataFrame({name: table[name].to_numpy(object).astype(np.float64) for name in columns})
+    except StudyError:
+        raise
     except (ValueError, OSError) as error:
-        if isinstance(error, StudyError):
-            raise
         raise StudyError(f"{path.name} cannot be read as a table ({str(error).splitlines()[0]})") from error
 
 
@@ -177,18 +176,6 @@ def _stacked(name: str, points: Sequence[np.ndarray], moved: Sequence[np.ndarray
     return np.stack([rows + row for rows, row in zip(points, fields, strict=True)])
 
 
-UNREADABLE = (
-    OSError,
-    ValueError,
-    KeyError,
-    TypeError,
-    RuntimeError,
-    EOFError,
-    ElementTree.ParseError,
-    BadZipFile,
-    zlib.error,
-)
-"""Exceptions of readers for damaged files, or files of another kind."""
 READERS: dict[str, Callable[[Path], Handed]] = {
     ".npz": _read_npz,
     ".csv": _read_csv,

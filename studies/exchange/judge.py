@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from massspring import Body
 from massspring.layout.face_pairs import faces_behind
 from massspring.layout.probe_arrays import tip_depth
 from massspring.sources import source_fingerprint
@@ -134,9 +135,8 @@ def measured(fitting: Fitting) -> dict[str, np.ndarray]:
     mesh, t, x = fitting.mesh, fitting.t, fitting.positions
     scene, body, steps = mesh.scene, mesh.body, len(fitting.t)
     at = [int(np.argmin(np.abs(t - checkpoint))) for checkpoint in scene.checkpoints]
-    surface, names = body.surface_nodes, mesh.volumes.names
-    depth = [[_depth(obstacle, each, surface, body.triangles, float(when)) for obstacle in scene.obstacles]
-             for when, each in zip(t, x, strict=True)]  # fmt: skip
+    names, moments = mesh.volumes.names, list(zip(x, t.tolist(), strict=True))
+    depth = [[_depth(obstacle, body, each, when) for obstacle in scene.obstacles] for each, when in moments]
     pressure = np.zeros((steps, len(names)))
     for column, name in enumerate(names):
         pressure[:, column] = fitting.histories.get("lumen_pressure" if name == LUMEN else "pressure", 0.0)
@@ -162,11 +162,11 @@ def measured(fitting: Fitting) -> dict[str, np.ndarray]:
     return fields
 
 
-def _depth(obstacle: Obstacle, x: np.ndarray, surface: np.ndarray, triangles: np.ndarray, t: float) -> float:
+def _depth(obstacle: Obstacle, body: Body, x: np.ndarray, t: float) -> float:
     """How deep the deepest surface node lies in an obstacle [m]."""
     if isinstance(obstacle, Probe):
-        return max(0.0, tip_depth(obstacle, x, triangles, t))
-    return max(0.0, -float(obstacle.gap(x[surface], t).min()))
+        return max(0.0, tip_depth(obstacle, x, body.triangles, t))
+    return max(0.0, -float(obstacle.gap(x[body.surface_nodes], t).min()))
 
 
 def _forces(scene: Scene, force: np.ndarray | None, steps: int) -> dict[str, np.ndarray]:
