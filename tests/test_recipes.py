@@ -191,15 +191,12 @@ def test_an_added_method_keeps_the_contract(method, request):
 
 
 @pytest.mark.slow
-def test_an_added_method_supports_what_its_table_says(method, request, monkeypatch):
+def test_an_added_method_supports_what_its_table_says(method, request):
     for kind in test_capabilities.REFUSED:
         body = test_capabilities.body_of_any(kind, request)
         test_capabilities.test_a_body_runs_or_is_refused_with_the_sentence_of_the_table(method, kind, body)
     for option in test_capabilities.REQUESTS:
-        with monkeypatch.context() as patch:
-            test_capabilities.test_an_option_runs_or_is_refused_with_the_sentence_of_the_table(
-                method, option, request, patch
-            )
+        test_capabilities.test_an_option_runs_or_is_refused_with_the_sentence_of_the_table(method, option, request)
     test_capabilities.test_every_method_supports_friction(method, request)
 
 
