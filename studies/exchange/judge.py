@@ -26,8 +26,7 @@ from studies.runs.case import Case
 from studies.runs.indicators import sway
 from studies.runs.prepare import LUMEN
 from studies.scene.scene import Scene
-from studies.store.new_record import new_fields, new_record
-from studies.store.record import Record, Status, write_record
+from studies.store.record import Record, Status, new_fields, new_record, write_record
 from studies.store.schema import RUN_FIELDS
 
 STILL = "the body did not move"

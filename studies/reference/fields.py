@@ -7,8 +7,7 @@ from studies.reference.nested import FamilySolution
 from studies.reference.problem import whole_forces
 from studies.reference.sample import mean_pressure, sample_fields
 from studies.scene.scene import Scene
-from studies.store.new_record import new_fields
-from studies.store.record import Field
+from studies.store.record import Field, new_fields
 from studies.store.schema import REFERENCE_FIELDS
 
 

@@ -21,9 +21,8 @@ from studies.reference.reference_solves import ReferenceSolve, physics_of, refer
 from studies.scene.as_json import scene_to_json
 from studies.scene.library import CUT, JUDGED
 from studies.scene.scene import Scene
-from studies.store.new_record import new_fields, new_record
 from studies.store.paths import key_digest
-from studies.store.record import Record, Status
+from studies.store.record import Record, Status, new_fields, new_record
 from studies.store.schema import REFERENCE_FIELDS
 
 FOLDER = Path(__file__).parent / "published"

@@ -27,8 +27,7 @@ from studies.reference.reference_solves import ReferenceSolve, reference_fingerp
 from studies.reference.sample import Sample, SamplePoints, sample_of
 from studies.reference.uncertainty import KAPPA_FACTOR, PENALTY_FACTOR, STEP_FACTOR
 from studies.scene.scene import Scene
-from studies.store.new_record import new_record
-from studies.store.record import Status, write_record
+from studies.store.record import Status, new_record, write_record
 
 Set = tuple[Problem, tuple[float, ...], NewtonSettings]
 

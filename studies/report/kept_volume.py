@@ -1,12 +1,10 @@
 """The table of volume errors of all stored runs of all studies, written by `organbench report`."""
 
-from collections.abc import Mapping, Sequence
-from functools import partial
+from collections.abc import Sequence
 
 import numpy as np
 import pandas as pd
 
-from massspring.sources import source_fingerprint
 from studies.base.errors import StudyError
 from studies.catalog.study import Study
 from studies.metrics.metric import COMPARABLE
@@ -34,26 +32,25 @@ def worst_volume(volume: np.ndarray, target: np.ndarray) -> float:
 
 def kept_volumes(ledger: Ledger, studies: Sequence[Study]) -> pd.DataFrame:
     """One row per stored run that the promise covers, the worst first; runs that broke off are left out."""
-    rows, code = dict[str, dict[str, object]](), source_fingerprint("studies.report.kept_volume")
+    rows = dict[str, dict[str, object]]()
     for study in studies:
-        jobs: dict[str, CaseJob] = {}
+        jobs: list[CaseJob] = []
         for job in case_jobs(ledger.root, study):
             entry = ledger.entry(job)
             if promised(job.work) and entry is not None and entry.status in COMPARABLE:
-                jobs[entry.file] = job
-        by_file = ledger.measured(study.name, "kept volumes", dict.fromkeys(jobs, code), partial(_row, jobs))
-        rows |= {jobs[file].work.replaced(recorded=()).key: row for file, row in by_file.items()}
+                jobs.append(job)
+        rows |= {job.work.replaced(recorded=()).key: row for job in jobs if (row := _row(job)) is not None}
     table = pd.DataFrame(list(rows.values()))
     return table if table.empty else table.sort_values(WORST, ascending=False)
 
 
-def _row(jobs: Mapping[str, CaseJob], file: str) -> dict[str, object] | None:
+def _row(job: CaseJob) -> dict[str, object] | None:
     """None for a file that turns out to be damaged: the table of its study reports it."""
     try:
-        record = read_record(jobs[file].path, ("volume", "volume_target"))
+        record = read_record(job.path, ("volume", "volume_target"))
     except StudyError:
         return None
-    case, worst = jobs[file].work, worst_volume(record.fields["volume"].values, record.fields["volume_target"].values)
+    case, worst = job.work, worst_volume(record.fields["volume"].values, record.fields["volume_target"].values)
     return {
         "scene": case.scene.name,
         "body": case.body.series,

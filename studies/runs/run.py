@@ -23,8 +23,7 @@ from studies.runs.limits import TIME_LIMIT
 from studies.runs.prepare import Prepared, prepare
 from studies.runs.surface_frames import moments, surface_fields
 from studies.runs.user_code import fault_of, files_of
-from studies.store.new_record import new_fields, new_record
-from studies.store.record import Field, Record, Status, read_record, write_record
+from studies.store.record import Field, Record, Status, new_fields, new_record, read_record, write_record
 from studies.store.schema import RUN_FIELDS
 
 OWN_FILES = "own_files"

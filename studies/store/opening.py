@@ -25,9 +25,8 @@ SUPERBLOCK = 3
 SEAL = 160
 """Bytes behind the HDF5 file proper, whose readers ignore them."""
 LABEL = b"\norganbench results; bytes and SHA-256 of what precedes these 160: "
-FORMER_SEAL = 512
-"""Bytes before the HDF5 file proper in files written earlier: the smallest user block that the format allows."""
-FORMER_LABEL = b"organbench results; bytes and SHA-256 of what follows these 512: "
+FORMER_LABEL = b"organbench results; "
+"""How files of organbench 0.2 begin, which had their checksum there."""
 CHUNK = 1 << 20
 
 
@@ -40,20 +39,19 @@ def check_seal(path: Path) -> None:
     """Raises DamagedFile unless every byte of a file is as it was written, OtherVersion for HDF5 without a seal, and
     OSError; about a millisecond per megabyte."""
     with open(path, "rb") as file:
-        head, size = file.read(FORMER_SEAL), file.seek(0, os.SEEK_END)
-        former = head.startswith(FORMER_LABEL)
-        place, length = (FORMER_SEAL, size - FORMER_SEAL) if former else (0, size - SEAL)
-        file.seek(place)
-        digest = _digest(file, length)
+        head, size = file.read(len(FORMER_LABEL)), file.seek(0, os.SEEK_END)
+        file.seek(0)
+        digest = _digest(file, size - SEAL)
         tail = file.read()
-    if (former and head == _former_seal(length, digest)) or tail == _seal(length, digest):
+    if tail == _seal(size - SEAL, digest):
         return
-    if head.startswith(SIGNATURE) and not tail.startswith(LABEL) and head[len(SIGNATURE) :][:1] != bytes([SUPERBLOCK]):
+    is_hdf5 = head.startswith(SIGNATURE)
+    other_format = is_hdf5 and head[len(SIGNATURE) :][:1] != bytes([SUPERBLOCK])
+    if (other_format and not tail.startswith(LABEL)) or head == FORMER_LABEL:
         raise OtherVersion(
             f"{path} is an HDF5 file of another program, or of an earlier version of organbench, which stored no "
-            "checksums: run its case again, or read it with the version that wrote it"
+            "checksums or had them elsewhere: run its case again, or read it with the version that wrote it"
         )
-    is_hdf5 = former or head.startswith(SIGNATURE)
     what = "is cut off or damaged" if is_hdf5 else "is not an HDF5 file, or was cut off"
     raise DamagedFile(f"{path} {what} ({size} bytes): {advice(path)}")
 
@@ -109,7 +107,3 @@ def _digest(file: BinaryIO, length: int) -> str:
 
 def _seal(length: int, digest: str) -> bytes:
     return (LABEL + f"{length} {digest}".encode()).ljust(SEAL - 1) + b"\n"
-
-
-def _former_seal(length: int, digest: str) -> bytes:
-    return (FORMER_LABEL + f"{length} {digest}\n".encode()).ljust(FORMER_SEAL, b"\0")

@@ -13,6 +13,9 @@ from studies.base.errors import StudyError
 
 NUMBER, INDEX, TEXT = "number", "whole number", "text"
 KINDS: dict[type, str] = {float: NUMBER, int: INDEX, str: TEXT}
+DTYPES = {NUMBER: "fiu", INDEX: "iu", TEXT: "U"}
+TYPES = {NUMBER: (int, float), INDEX: (int,), TEXT: (str,)}
+"""The numpy kinds of arrays, and the Python types of single values."""
 V = TypeVar("V")
 T = TypeVar("T", float, int, str)
 P = TypeVar("P", bound="Part")
@@ -60,12 +63,46 @@ class FieldSpec(Part[V]):
 
     shape: str
 
+    def fault(self, fields: Mapping[str, Any], lengths: dict[str, int]) -> str | None:
+        """What is wrong with it among `fields` (name -> anything with `values` and `unit`), as the end of a sentence.
+        The first use of a letter adds its length to `lengths`."""
+        if self.name not in fields:
+            return None if self.optional else f"lacks {self.name!r}"
+        values, unit = np.asarray(fields[self.name].values), fields[self.name].unit
+        if values.dtype.kind not in DTYPES[self.kind]:
+            return f"holds {self.name!r} as {values.dtype}, not as {self.kind}s"
+        if unit != self.unit:
+            return f"holds {self.name!r} in {unit!r}, not in {self.unit!r}"
+        letters = self.shape.split()
+        if values.ndim != len(letters):
+            shape = [lengths.get(x, x) for x in letters]
+        else:
+            pairs = zip(letters, values.shape, strict=True)
+            shape = [int(x) if x.isdigit() else lengths.setdefault(x, n) for x, n in pairs]
+            if tuple(shape) == values.shape:
+                return None
+        return f"holds {self.name!r} with shape ({_row(values.shape)}), not ({_row(shape)})"
+
 
 @dataclass(frozen=True)
 class AttributeSpec(Part[V]):
     """A number or text. length: the letter in shapes that it is the length of."""
 
     length: str
+
+    def fault(self, attributes: Mapping[str, Any]) -> str | None:
+        """What is wrong with it among `attributes`, as the end of a sentence."""
+        value = attributes.get(self.name)
+        if value is None:
+            return None if self.optional else f"lacks the attribute {self.name!r}"
+        value = value.item() if isinstance(value, np.generic) else value
+        if isinstance(value, bool) or not isinstance(value, TYPES[self.kind]):
+            return f"has {self.name} = {str(value)[:40]!r}, not a {self.kind}"
+        return None
+
+
+def _row(lengths: Any) -> str:
+    return ", ".join(map(str, lengths))
 
 
 def array(shape: str, kind: str, unit: str, description: str) -> FieldSpec[np.ndarray]:

@@ -8,7 +8,7 @@ import json
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypedDict, Unpack
 
 import h5py
 import numpy as np
@@ -16,9 +16,9 @@ import numpy as np
 from studies.base.atomic import write_whole
 from studies.base.errors import DamagedFile, OtherVersion, StudyError
 from studies.base.lookup import lookup
-from studies.store.faults import fault
+from studies.store.machine import machine_id
 from studies.store.opening import AGAIN, FORMAT, open_results, sealed
-from studies.store.schema import LAYOUTS, Status
+from studies.store.schema import LAYOUTS, FieldSpec, Status, fault
 from studies.store.vtk_group import add_vtk_group
 
 INDEX_KIND = "index"
@@ -26,8 +26,6 @@ INDEX_KIND = "index"
 SCHEMA = 2
 """Version of the layout (studies.store.schema); raised when a reader of the old one would misread the new one. 1 had no
 seal."""
-PART_DIGESTS = "checksums"
-"""Attribute of files written earlier, with digests of their parts, which the seal of the whole file replaces."""
 DIMENSION = "This is a netCDF dimension but not a netCDF variable.%10d"
 """Name of a dimension scale without values (docs.unidata.ucar.edu/netcdf-c, "NetCDF-4 file format specification")."""
 
@@ -62,6 +60,33 @@ class Record:
     machine: str
     attributes: dict[str, Any] = field(default_factory=dict)
     fields: dict[str, Field] = field(default_factory=dict)
+
+
+class Header(TypedDict):
+    """What a record is of and how it ended, as in `Record`."""
+
+    kind: str
+    key: str
+    name: str
+    status: Status
+    message: str
+    fingerprint: str
+
+
+def new_record(*, attributes: Mapping[str, Any], fields: Mapping[str, Field], **header: Unpack[Header]) -> Record:
+    """A record with the current schema and this machine's id filled in."""
+    return Record(schema=SCHEMA, machine=machine_id(), attributes=dict(attributes), fields=dict(fields), **header)
+
+
+def new_fields(specs: Mapping[str, FieldSpec], values: Mapping[str, np.ndarray]) -> dict[str, Field]:
+    """`values` as fields, with the units and descriptions of their table (schema.py).
+
+    Raises StudyError for a name that the table lacks.
+    """
+    unknown = sorted(set(values) - set(specs))
+    if unknown:
+        raise StudyError(f"no table of studies/store/schema.py lists the field {unknown[0]!r}; give it a line there")
+    return {name: Field(np.asarray(v), specs[name].unit, specs[name].description) for name, v in values.items()}
 
 
 TEXT = h5py.string_dtype()
@@ -157,7 +182,7 @@ def _check(record: Record) -> None:
     lookup(record.status, [str(status) for status in Status], "status")
     for name, value in record.attributes.items():
         simple = value is None or isinstance(value, (str, bool, int, float, np.number, np.bool_))
-        if name in (*HEADER, PART_DIGESTS) or not (simple or _is_short_list(value)):
+        if name in HEADER or not (simple or _is_short_list(value)):
             raise StudyError(
                 f"attribute {name!r} = {str(value)[:60]!r} of record {record.name!r} cannot be stored: "
                 f"its name must not be one of {', '.join(HEADER)} and its value a number, text, None or a short list"
@@ -199,7 +224,7 @@ def _header(path: Path, file: h5py.File, selection: Collection[str] | None = Non
         )
     if _plain(attributes.get("kind")) == INDEX_KIND:
         raise StudyError(f"{path} is the index of a study, not a case: give one of the files next to it")
-    names = [name for name in selection or attributes if name in attributes and name != PART_DIGESTS]
+    names = [name for name in selection or attributes if name in attributes]
     values = {name: _plain(attributes[name]) for name in names}
     header = {name: values.pop(name) for name in HEADER}
     header["status"] = Status(lookup(header["status"], [str(status) for status in Status], f"status in {path}"))

@@ -3,7 +3,9 @@
 Writers, the reader's check and the tests take it from here.
 """
 
+from collections.abc import Mapping
 from enum import StrEnum
+from typing import Any
 
 from studies.store.parts import (
     INDEX,
@@ -214,3 +216,21 @@ LAYOUTS: dict[str, tuple[dict[str, FieldSpec], dict[str, AttributeSpec]]] = {
     "timing": (TIMING_FIELDS, TIMING_ATTRIBUTES),
 }
 """Kind of a record -> its fields and attributes. A record of another kind is not checked."""
+
+
+def fault(kind: str, status: Status, attributes: Mapping[str, Any], fields: Mapping[str, Any]) -> str | None:
+    """The first thing in which a record differs from its table, as the end of a sentence ("lacks 'volume'"), or None.
+
+    fields: name -> anything with `values` and `unit`.
+    """
+    if kind not in LAYOUTS or status in WITHOUT_FIELDS:
+        return None
+    field_specs, attribute_specs = LAYOUTS[kind]
+    wrong = next(filter(None, (spec.fault(attributes) for spec in attribute_specs.values())), None)
+    if wrong:
+        return wrong
+    unknown = sorted(set(fields) - set(field_specs))
+    if unknown:
+        return f"holds {unknown[0]!r}, which is not a field of a {kind}"
+    lengths = {spec.length: attributes[name] for name, spec in attribute_specs.items() if spec.length}
+    return next(filter(None, (spec.fault(fields, lengths) for spec in field_specs.values())), None)

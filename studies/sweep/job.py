@@ -21,9 +21,8 @@ from studies.runs.current import case_fingerprint
 from studies.runs.user_code import files_of
 from studies.scene.scene import Scene
 from studies.store.entry import file_state, read_entry, why_entry_is_stale
-from studies.store.new_record import new_record
 from studies.store.paths import SUFFIX, file_stem, key_digest, study_folder
-from studies.store.record import Status, write_record
+from studies.store.record import Status, new_record, write_record
 from studies.sweep.estimate import case_seconds, solve_seconds, unknowns
 
 REFERENCE = "reference "

@@ -6,7 +6,9 @@ from pathlib import Path
 
 from studies.base.errors import OtherVersion, StudyError
 from studies.catalog.study import Study
+from studies.metrics.metric import Metric
 from studies.metrics.run import Run
+from studies.metrics.table import Row, row_of
 from studies.metrics.timing.cases import timing_of
 from studies.metrics.timing.protocol import FrameTiming
 from studies.reference.load import Reference, reference_for
@@ -62,6 +64,17 @@ def load_runs(root: Path, study: Study, references: References | None = None) ->
         runs += [run] if run else []
         problems += missing
     return runs, sentences(problems)
+
+
+def table_rows(references: References, study: Study, metrics: Sequence[Metric]) -> tuple[list[Row], list[str]]:
+    """A row per stored case (studies.metrics.table), and what is missing or damaged in sentences. One run is in memory
+    at a time."""
+    rows, problems = list[Row](), reference_problems(references, study)
+    for job in case_jobs(references.ledger.root, study):
+        run, missing = load_run(references, job)
+        rows += [row_of(run, metrics)] if run else []
+        problems += missing
+    return rows, sentences(problems)
 
 
 def load_run(references: References, job: CaseJob) -> tuple[Run | None, list[StudyError]]:

@@ -15,8 +15,7 @@ from studies.runs.recipes import BODIES
 from studies.scene.library.ball_clamped import BALL_CLAMPED
 from studies.scene.library.ball_squeeze import BALL_SQUEEZE
 from studies.scene.library.liver_press import LIVER_PRESS
-from studies.store.new_record import new_record
-from studies.store.record import Field, Status
+from studies.store.record import Field, Status, new_record
 from tests.massspring.quadratic import second_order
 
 FRAMES = 40

@@ -12,8 +12,7 @@ from studies.reference.solution import Boundary
 from studies.runs.case import Case
 from studies.runs.recipes import TetrahedralBody
 from studies.scene.library.ball_clamped import BALL_CLAMPED
-from studies.store.new_record import new_fields, new_record
-from studies.store.record import Status
+from studies.store.record import Status, new_fields, new_record
 from studies.store.schema import RUN_FIELDS
 from tests.studies.tiny import cube
 

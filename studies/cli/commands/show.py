@@ -31,7 +31,6 @@ def show(
     every: Annotated[
         bool, typer.Option("--all", help="name every case; of a results file also the meaning of each field")
     ] = False,
-    check: Annotated[bool, typer.Option(help="verify the checksums of all files, not only changed ones")] = False,
 ) -> None:
     """Show what is ok, failed, stale or missing, and why, or the numbers in a results file."""
     if what.endswith(SUFFIX):
@@ -44,7 +43,7 @@ def show(
             study_folder(root, study.name)  # raises for what names no folder
     if not results.is_dir():
         raise StudyError(f"there is no folder {results}: run `organbench run` first, or name the folder by --results")
-    chosen, ledger = [study.smoke() if smoke else study for study in chosen], Ledger(root, check)
+    chosen, ledger = [study.smoke() if smoke else study for study in chosen], Ledger(root)
     for study in chosen:
         with busy(f"checking {study.name}"):
             found = standings(ledger, study)

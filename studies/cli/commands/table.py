@@ -22,8 +22,7 @@ from studies.store.ledger import Ledger
 from studies.store.tables import write_parquet, write_table
 from studies.sweep.find_study import find_study
 from studies.sweep.job import case_jobs
-from studies.sweep.load import References
-from studies.sweep.rows import table_rows
+from studies.sweep.load import References, table_rows
 
 Row = Mapping[Any, Any]
 SETTINGS = {"law": "law {}", "nodes": "{} nodes", "stiffness": "stiffness {}", "dt/dt_c": "dt = {} dt_c"}

@@ -15,9 +15,8 @@ from studies.runs.case import Case
 from studies.runs.current import case_fingerprint, case_path
 from studies.runs.prepare import prepare
 from studies.store.machine import machine_id
-from studies.store.new_record import new_record
 from studies.store.paths import timing_path
-from studies.store.record import Record, Status, write_record
+from studies.store.record import Record, Status, new_record, write_record
 
 REPEATS, FEWEST = 5, 1
 BUDGET = 6.0

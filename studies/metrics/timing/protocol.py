@@ -14,8 +14,7 @@ from threadpoolctl import threadpool_limits
 from studies.base.collection import uncollected
 from studies.base.errors import StudyError
 from studies.metrics.timing.statistics import DEADLINES_MS, Ratio, kernel_ns, missed, percentiles, ratio_with_spread
-from studies.store.new_record import new_fields
-from studies.store.record import Field
+from studies.store.record import Field, new_fields
 from studies.store.schema import TIMING_FIELDS
 
 __all__ = ["DEADLINES_MS", "FrameTiming", "Ratio", "interleave", "kernel_ns", "missed", "percentiles"]

@@ -11,7 +11,7 @@ from studies.reference.nested import DISPLACEMENT, fine_enough
 from studies.reference.sample import SERIES, Sample, SamplePoints, sample_fields, samples_in
 from studies.reference.uncertainty import FACTORS, QUANTITIES, uncertainties, uncertainty_of_meshes
 from studies.scene.library import BALL_CLAMPED, BALL_SQUEEZE
-from studies.store.new_record import new_fields
+from studies.store.record import new_fields
 from studies.store.schema import REFERENCE_FIELDS
 from tests.studies.tiny import cube
 

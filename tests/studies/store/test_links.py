@@ -3,14 +3,12 @@ import shutil
 import h5py
 import numpy as np
 import pytest
-from rich.console import Console
 
 from studies.base.errors import StudyError
-from studies.cli.record_text import describe
 from studies.store import links
 from studies.store.ledger import Ledger
 from studies.store.links import link_study
-from studies.store.paths import index_path, key_hash, readable, record_files, record_path, timing_path
+from studies.store.paths import index_path, key_hash, record_path, timing_path
 from studies.store.record import SCHEMA, Field, Record, Status, read_record, write_record
 
 
@@ -20,48 +18,6 @@ def store(root, name, key, status=Status.OK, message=""):
     path = record_path(root, "volume_loss", name, key)
     write_record(path, record)
     return path
-
-
-def shown(tree) -> str:
-    console = Console(width=160, color_system=None)
-    with console.capture() as capture:
-        console.print(tree)
-    return capture.get()
-
-
-def test_paths_are_readable_and_differ_by_the_case(tmp_path):
-    path = record_path(tmp_path, "volume_loss", "ball / free, dt=0.5·dt_c", '{"dt": 1, "m": 2}')
-    assert path.parent == tmp_path / "volume_loss"
-    other_order = '{"m": 2, "dt": 1}'
-    assert path.name == f"ball-free-dt=0.5-dt_c-{key_hash(other_order)}.h5"
-    assert record_path(tmp_path, "volume_loss", "x", '{"dt": 1}') != record_path(
-        tmp_path, "volume_loss", "x", '{"dt": 2}'
-    )
-    assert readable("x" * 300 + "!") == "x" * 100
-    assert readable("../..") == "case"
-
-
-def test_a_hash_does_not_change_between_versions():
-    # printf '{"dt":1}' | sha256sum
-    assert key_hash('{ "dt" : 1 }') == "f8cd3b88"
-
-
-@pytest.mark.parametrize("study", ["../elsewhere", "a/b", "", ".hidden"])
-def test_a_study_stays_in_its_folder(tmp_path, study):
-    with pytest.raises(StudyError, match="cannot name a study"):
-        record_path(tmp_path, study, "x", "{}")
-
-
-def test_timing_files_are_siblings_and_no_records(tmp_path):
-    path = store(tmp_path, "ball/free", '{"a": 1}')
-    timing = timing_path(path, "89abcdef")
-    assert timing.name == path.name.replace(".h5", ".timing.89abcdef.h5")
-    shutil.copy(path, timing)
-    path.with_name(path.name + ".77.part").write_bytes(b"")
-    link_study(Ledger(tmp_path), "volume_loss")
-    assert record_files(tmp_path, "volume_loss") == [path]
-    with pytest.raises(StudyError, match="cannot be a machine id"):
-        timing_path(path, "../x")
 
 
 def test_a_record_that_is_open_by_its_link_can_be_read(tmp_path):
@@ -114,21 +70,6 @@ def test_an_unreadable_case_is_reported_and_left_out(tmp_path):
     assert bad.name in problems[0]
     with h5py.File(index_path(tmp_path, "volume_loss")) as file:
         assert list(file["ball"]) == ["free"]
-
-
-def test_show_tells_status_units_and_numbers(tmp_path):
-    path = store(tmp_path, "ball/free", '{"a": 1}', Status.DIVERGED, "at t = 0.2 s [m]")
-    text = shown(describe(path, every=True))
-    for part in (
-        "ball/free",
-        "diverged: at t = 0.2 s [m]",
-        "worst = 0.000125",
-        "m^3",
-        "enclosed volume",
-        "0.5",
-        "not finite: 1 of ",
-    ):
-        assert part in text, part
 
 
 def test_an_index_is_no_record(tmp_path):

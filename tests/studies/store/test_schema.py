@@ -5,15 +5,12 @@ from pathlib import Path
 
 import pytest
 
-from studies.base.errors import StudyError
 from studies.exchange.entry import ENTRY, SECONDS
 from studies.metrics.timing.cases import timing_file
 from studies.runs.current import case_path
 from studies.runs.run import OWN_FILES
-from studies.store.faults import fault
-from studies.store.new_record import new_fields
 from studies.store.record import read_record
-from studies.store.schema import LAYOUTS, LENGTHS, REFERENCE_FIELDS, RUN_FIELDS, STATUSES, Status
+from studies.store.schema import LAYOUTS, LENGTHS, RUN_FIELDS, STATUSES, Status, fault
 from tests.studies import made_up_run
 from tests.studies.tiny import tiny_case
 
@@ -63,8 +60,3 @@ def test_what_a_run_writes_is_what_its_tables_list(finished_sweep):
     timing = read_record(timing_file(finished_sweep, "tiny", tiny_case(timed=True)))
     assert set(timing.fields) == set(LAYOUTS["timing"][0])
     assert set(timing.attributes) == set(LAYOUTS["timing"][1])
-
-
-def test_a_field_without_a_line_in_a_table_is_refused():
-    with pytest.raises(StudyError, match=r"lists the field 'volumes'; give it a line there"):
-        new_fields(REFERENCE_FIELDS, {"volumes": made_up_run.T})

@@ -101,12 +101,14 @@ def test_no_number_is_stored_twice(stored):
     assert 0 < sum(sizes.values()) <= 3 * 8 + 4 * 8 * len(steps_of(record))
 
 
-def test_the_same_record_is_the_same_bytes_at_any_time(stored):
-    record, path = stored
-    before = path.read_bytes()
+def test_the_same_record_is_the_same_bytes_at_any_time(tmp_path):
+    for number, make in enumerate(RECORDS.values()):
+        write_record(tmp_path / f"{number}.h5", make())
+    before = [path.read_bytes() for path in sorted(tmp_path.iterdir())]
     time.sleep(1.1)  # stamps of HDF5 are in seconds
-    write_record(path, record)
-    assert path.read_bytes() == before
+    for number, make in enumerate(RECORDS.values()):
+        write_record(tmp_path / f"{number}.h5", make())
+    assert [path.read_bytes() for path in sorted(tmp_path.iterdir())] == before
 
 
 def test_a_record_without_a_body_has_no_group(tmp_path):

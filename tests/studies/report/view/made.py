@@ -13,9 +13,8 @@ from studies.reference.sample import Sample, SamplePoints, sample_fields
 from studies.runs.case import Case
 from studies.runs.recipes import TetrahedralBody
 from studies.scene.scene import Scene
-from studies.store.new_record import new_fields, new_record
 from studies.store.paths import record_path
-from studies.store.record import Record, Status, write_record
+from studies.store.record import Record, Status, new_fields, new_record, write_record
 from studies.store.schema import REFERENCE_FIELDS
 from tests.studies.made_up_run import CELLS, POINTS, SCENE, bend, run
 

@@ -4,13 +4,13 @@ import h5py
 import numpy as np
 import pytest
 
-from studies.base.errors import DamagedFile, StudyError
+from studies.base.errors import DamagedFile, OtherVersion, StudyError
 from studies.store import opening
-from studies.store.entry import DAMAGED, why_stale
-from studies.store.opening import sealed
+from studies.store.entry import DAMAGED, read_entry
+from studies.store.opening import open_results, sealed
 from studies.store.record import SCHEMA, Field, peek, read_record, write_record
 from tests.studies import made_up_run
-from tests.studies.store.test_store import KEY, record
+from tests.studies.store.test_record import record
 
 
 def change(path, by, seal=True):
@@ -19,6 +19,15 @@ def change(path, by, seal=True):
         by(file)
     if seal:
         path.write_bytes(sealed(path.read_bytes()))
+
+
+def test_reading_changes_nothing(tmp_path):
+    path = tmp_path / "a.h5"
+    write_record(path, record())
+    before = path.read_bytes()
+    with open_results(path) as file, pytest.raises(OSError, match="no write intent"):
+        file["t"][0] = 7.0
+    assert read_record(path).name == record().name and path.read_bytes() == before
 
 
 def test_a_cut_off_file_is_one_sentence_wherever_it_was_cut(tmp_path):
@@ -30,7 +39,7 @@ def test_a_cut_off_file_is_one_sentence_wherever_it_was_cut(tmp_path):
         with pytest.raises(StudyError, match="cut off") as problem:
             read_record(path)
         assert "\n" not in str(problem.value)
-        assert why_stale(path, KEY, "f" * 64) == DAMAGED
+        assert read_entry(path).fault == DAMAGED
 
 
 def test_a_changed_byte_is_found_wherever_it_is_in_a_large_file(tmp_path):
@@ -44,18 +53,44 @@ def test_a_changed_byte_is_found_wherever_it_is_in_a_large_file(tmp_path):
             peek(path)
 
 
-def test_foreign_files_are_one_sentence(tmp_path):
-    (tmp_path / "text.h5").write_text("hello")
-    with pytest.raises(StudyError, match="is not an HDF5 file"):
-        read_record(tmp_path / "text.h5")
-    with h5py.File(tmp_path / "theirs.h5", "w") as file:
+def test_the_library_never_sees_a_changed_byte(tmp_path, monkeypatch):
+    """Some bits send it into an endless loop."""
+    path, opened = tmp_path / "a.h5", []
+    write_record(path, record())
+    whole = path.read_bytes()
+    monkeypatch.setattr(opening.h5py, "File", lambda *words, **more: opened.append(words))
+    for place in {*range(0, len(whole), 37), len(whole) - 1}:
+        path.write_bytes(whole[:place] + bytes([whole[place] ^ 1 << place % 8]) + whole[place + 1 :])
+        assert read_entry(path).fault == DAMAGED
+    assert opened == []
+
+
+def of_another_program(path):
+    with h5py.File(path, "w") as file:
         file["x"] = 1.0
-    with pytest.raises(StudyError, match="is an HDF5 file of another program"):
-        peek(tmp_path / "theirs.h5")
-    with pytest.raises(StudyError, match="there is no results file"):
-        peek(tmp_path / "missing.h5")
-    with pytest.raises(StudyError, match="there is no results file"):
-        peek(tmp_path)
+
+
+def of_version_0_2(path):
+    """With its checksum in the user block of HDF5."""
+    path.write_bytes(b"organbench results; bytes and SHA-256 of what follows these 512: 9".ljust(512, b"\0") + b"image")
+
+
+FOREIGN = {
+    "is not an HDF5 file, or was cut off": (DamagedFile, lambda path: path.write_text("hello")),
+    "is an HDF5 file of another program": (OtherVersion, of_another_program),
+    "of an earlier version of organbench": (OtherVersion, of_version_0_2),
+    "is not a file": (DamagedFile, lambda path: path.mkdir()),
+    "there is no results file": (StudyError, lambda path: None),
+}
+
+
+@pytest.mark.parametrize("sentence", FOREIGN)
+def test_what_is_no_results_file_is_one_sentence(tmp_path, sentence):
+    path, (kind, make) = tmp_path / "a.h5", FOREIGN[sentence]
+    make(path)
+    with pytest.raises(kind, match=sentence) as problem:
+        peek(path)
+    assert str(path) in str(problem.value) and "\n" not in str(problem.value)
 
 
 @pytest.mark.parametrize("schema", [0, SCHEMA + 1, "old"])
@@ -63,27 +98,8 @@ def test_another_schema_is_refused(tmp_path, schema):
     path = tmp_path / "a.h5"
     write_record(path, record())
     change(path, lambda file: file.attrs.__setitem__("schema", schema))
-    with pytest.raises(StudyError, match=f"has results schema {schema}, this version reads {SCHEMA}"):
+    with pytest.raises(OtherVersion, match=f"has results schema {schema}, this version reads {SCHEMA}"):
         read_record(path)
-
-
-def scale_last(file):
-    file["volume"][-1, 0] *= 1.5
-
-
-def note(file):
-    file.attrs["note"] = "looked at on Monday"
-
-
-@pytest.mark.parametrize("by", [scale_last, note])
-def test_what_is_changed_or_added_is_damage(tmp_path, by):
-    path, stored = tmp_path / "a.h5", made_up_run.run().record
-    write_record(path, stored)
-    assert why_stale(path, stored.key, stored.fingerprint) is None
-    change(path, by, seal=False)
-    assert why_stale(path, stored.key, stored.fingerprint) == DAMAGED
-    with pytest.raises(DamagedFile, match="is cut off or damaged"):
-        peek(path)
 
 
 def other_text(file):
@@ -124,16 +140,8 @@ def test_what_no_record_holds_is_damage_under_any_seal(tmp_path, fault):
     assert sentence in str(problem.value) and str(path) in str(problem.value) and "\n" not in str(problem.value)
 
 
-def test_the_library_never_sees_a_changed_byte(tmp_path, monkeypatch):
-    """Some bits send it into an endless loop."""
-    path, one = tmp_path / "a.h5", record()
-    write_record(path, one)
-    whole = path.read_bytes()
-    opened = []
-    monkeypatch.setattr(opening.h5py, "File", lambda *words, **more: opened.append(words))
-    for place in {*range(0, len(whole), 37), len(whole) - 1}:
-        path.write_bytes(whole[:place] + bytes([whole[place] ^ 1 << place % 8]) + whole[place + 1 :])
-        with pytest.raises(DamagedFile):
-            read_record(path)
-        assert why_stale(path, KEY, "f" * 64) == DAMAGED
-    assert opened == []
+def test_what_is_changed_through_the_library_is_damage(tmp_path):
+    path = tmp_path / "a.h5"
+    write_record(path, made_up_run.run().record)
+    change(path, lambda file: file.attrs.__setitem__("note", "looked at on Monday"), seal=False)
+    assert read_entry(path).fault == DAMAGED
