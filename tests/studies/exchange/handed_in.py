@@ -21,6 +21,3 @@ class HandedIn:
         data = {"t": self.t, "positions": self.positions, "force": self.force, "pressure": self.pressure} | changes
         np.savez(path, **{name: values for name, values in data.items() if values is not None})
         return path
-
-    def with_positions(self, path, positions):
-        return self.npz(path, positions=positions)

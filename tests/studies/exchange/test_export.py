@@ -113,15 +113,6 @@ def test_the_export_names_material_times_and_what_is_judged(exported):
         assert phrase in page
 
 
-@pytest.mark.parametrize("scene", EXPORTED, ids=lambda scene: scene.name)
-def test_numbers_are_as_people_write_them(scene):
-    text = json.dumps(rounded(description(scene, [], ""))) + paths_table(scene).to_csv(float_format=f"%.{DIGITS}g")
-    numbers = re.findall(r"-?\d+\.?\d*(?:e-?\d+)?", text)
-    assert not [number for number in numbers if len(number.lstrip("-").replace(".", "")) > DIGITS + 4]
-    assert not re.search(r"(?<![\d.e])-0(\.0)?(?![\d.])", text)
-    assert np.allclose(rounded(description(scene, [], ""))["checkpoints"], scene.checkpoints, rtol=1e-11)
-
-
 def test_the_page_holds_what_our_own_bodies_reach(exported, tmp_path, organbench, mesh_cache, monkeypatch):
     page = (exported / "README.md").read_text()
     table = pd.read_csv(TABLE).query("scene == 'ball_clamped' and body == 'surface' and nodes == 550")
@@ -140,23 +131,31 @@ def test_the_page_holds_what_our_own_bodies_reach(exported, tmp_path, organbench
 
 
 @pytest.mark.parametrize("scene", EXPORTED, ids=lambda scene: scene.name)
-def test_every_scene_has_words_for_all_that_happens(scene):
-    data = description(scene, [], "")
+def test_every_scene_has_words_for_all_that_happens_and_numbers_as_people_write_them(scene):
+    data, paths = description(scene, [], ""), paths_table(scene)
     assert json.dumps(data, allow_nan=False) and data["force"]["words"]
     assert len(data["obstacles"]) == len(scene.obstacles) and all(entry["words"] for entry in data["obstacles"])
     assert [metric["name"] for metric in data["judged"]] == [metric.name for metric in judged_metrics(scene)]
-    assert ("lumen_volume_factor" in paths_table(scene)) == (scene.lumen is not None)
+    assert ("lumen_volume_factor" in paths) == (scene.lumen is not None)
+    text = json.dumps(rounded(data)) + paths.to_csv(float_format=f"%.{DIGITS}g")
+    numbers = re.findall(r"-?\d+\.?\d*(?:e-?\d+)?", text)
+    assert not [number for number in numbers if len(number.lstrip("-").replace(".", "")) > DIGITS + 4]
+    assert not re.search(r"(?<![\d.e])-0(\.0)?(?![\d.])", text)
+    assert np.allclose(rounded(data)["checkpoints"], scene.checkpoints, rtol=1e-11)
+
+
+PLANE = BALL_SQUEEZE.obstacles[0]
+OBSTACLES = {
+    "plane through (0, 0, 0.05) m with normal (0, 0, -1)": PLANE,
+    "no slip": replace(PLANE, friction="no_slip"),
+    "coefficient 0.3": replace(PLANE, friction=0.3),
+    "capsule of radius 0.01 m from (0, 0, 0) m to (0, 0, 1) m": Capsule((0, 0, 0), (0, 0, 1), 0.01),
+    "thin probe": Probe((0, 0, 1)),
+}
 
 
 def test_words_of_obstacles_tell_shape_friction_and_path():
-    plane = BALL_SQUEEZE.obstacles[0]
-    assert "plane through (0, 0, 0.05) m with normal (0, 0, -1)" in obstacle_words(plane)
-    assert "no slip" in obstacle_words(replace(plane, friction="no_slip"))
-    assert "coefficient 0.3" in obstacle_words(replace(plane, friction=0.3))
-    assert "capsule of radius 0.01 m from (0, 0, 0) m to (0, 0, 1) m" in obstacle_words(
-        Capsule((0, 0, 0), (0, 0, 1), 0.01)
-    )
-    assert "thin probe" in obstacle_words(Probe((0, 0, 1)))
+    assert all(words in obstacle_words(obstacle) for words, obstacle in OBSTACLES.items())
 
 
 OWN = "from dataclasses import replace\nfrom studies import BALL_SQUEEZE\nSCENE = replace(BALL_SQUEEZE, name='mine')\n"
@@ -170,18 +169,24 @@ def test_a_scene_of_one_s_own_is_exported_too(organbench, tmp_path, mesh_cache):
     assert json.loads((tmp_path / "out" / "scene.json").read_text())["name"] == "mine"
 
 
-def test_what_cannot_be_exported_is_refused(refused, tmp_path):
-    assert "unknown scene 'ball_squeze'; did you mean" in refused("export", "ball_squeze")
-    (tmp_path / "taken").write_text("")
-    assert "is a file; give the name of a folder" in refused("export", "ball_squeeze", "-o", tmp_path / "taken")
-    assert "there is no file" in refused("export", tmp_path / "none.py")
-    (tmp_path / "empty.py").write_text("")
-    assert "defines neither STUDY nor SCENE" in refused("export", tmp_path / "empty.py")
-    assert "nodes" in refused("export", "ball_squeeze", "-o", tmp_path / "few", "--nodes", 3)
-    (tmp_path / "full").mkdir()
-    (tmp_path / "full" / "README.md").write_text("mine")
-    assert "holds other files; give a new folder" in refused("export", "ball_squeeze", "-o", tmp_path / "full")
-    assert (tmp_path / "full" / "README.md").read_text() == "mine"
+REFUSED = {
+    "unknown scene 'ball_squeze'; did you mean": ("ball_squeze",),
+    "there is no file": ("none.py",),
+    "defines neither STUDY nor SCENE": ("empty.py",),
+    "is a file; give the name of a folder": ("ball_squeeze", "-o", "empty.py"),
+    "holds other files; give a new folder": ("ball_squeeze", "-o", "full"),
+    "nodes": ("ball_squeeze", "-o", "few", "--nodes", 3),
+}
+
+
+@pytest.mark.parametrize("message", REFUSED)
+def test_what_cannot_be_exported_is_refused(refused, tmp_path, monkeypatch, message):
+    monkeypatch.chdir(tmp_path)
+    Path("empty.py").write_text("")
+    Path("full").mkdir()
+    Path("full/README.md").write_text("mine")
+    assert message in refused("export", *REFUSED[message])
+    assert Path("full/README.md").read_text() == "mine"
 
 
 def test_an_export_replaces_an_earlier_one_but_no_program_that_was_edited(tmp_path, mesh_cache):

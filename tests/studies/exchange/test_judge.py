@@ -3,9 +3,8 @@
 import shutil
 import subprocess
 import sys
+from pathlib import Path
 
-import h5py
-import meshio
 import numpy as np
 import pytest
 
@@ -42,72 +41,6 @@ def test_our_own_run_gets_the_same_metrics(ours, reference, tmp_path):
     for metric in compared:
         assert metric(entry) == pytest.approx(metric(own), rel=NEAR, abs=0), metric.name
         assert metric.uncertainty(entry) == pytest.approx(metric.uncertainty(own), rel=NEAR, nan_ok=True)
-
-
-def as_vtu(ours, folder, moved=False):
-    """A VTU file for each checkpoint, and one at rest."""
-    folder.mkdir()
-    steps = [int(np.argmin(np.abs(ours.t - t))) for t in (0.0, *SCENE.checkpoints)]
-    for number, step in enumerate(steps):
-        x = ours.positions[step]
-        data = {"displacement": x - ours.positions[0]} if moved else {}
-        points = ours.positions[0] if moved else x
-        meshio.write(folder / f"step{number:02d}.vtu", meshio.Mesh(points, [("vertex", [[0]])], data))
-    return folder
-
-
-def as_pvd(ours, folder):
-    as_vtu(ours, folder)
-    steps = reversed(list(enumerate((0.0, *SCENE.checkpoints))))
-    sets = [f'<DataSet timestep="{t}" file="step{k:02d}.vtu"/>' for k, t in steps]
-    path = folder / "all.pvd"
-    path.write_text(f'<VTKFile type="Collection"><Collection>{"".join(sets)}</Collection></VTKFile>')
-    return path
-
-
-def as_csv(ours, path):
-    rows = [
-        f"{float(t)!r},{i},{','.join(repr(float(c)) for c in p)}"
-        for t, x in zip(ours.t, ours.positions, strict=True)
-        for i, p in enumerate(x)
-    ]
-    path.write_text("\n".join(["t,node,x,y,z", *reversed(rows)]))
-    return path
-
-
-def as_vtkhdf(ours, path, moved=False):
-    steps, n, _ = ours.positions.shape
-    with h5py.File(path, "w") as file:
-        root = file.create_group("VTKHDF")
-        root["NumberOfPoints"] = np.array([n])
-        root["Points"] = ours.positions[0] if moved else ours.positions.reshape(-1, 3)
-        root["Steps/Values"] = ours.t
-        root["Steps/PointOffsets"] = np.zeros(steps, int) if moved else n * np.arange(steps)
-        if moved:
-            root["PointData/displacement"] = (ours.positions - ours.positions[0]).reshape(-1, 3)
-            root["Steps/PointDataOffsets/displacement"] = n * np.arange(steps)
-    return path
-
-
-FORMS = {
-    "CSV": (lambda ours, folder: as_csv(ours, folder / "a.csv"), 40, 0.0),
-    "VTKHDF": (lambda ours, folder: as_vtkhdf(ours, folder / "a.vtkhdf"), 40, 0.0),
-    "VTKHDF that stands still": (lambda ours, folder: as_vtkhdf(ours, folder / "b.vtkhdf", True), 40, 1e-16),
-    "VTU": (lambda ours, folder: as_vtu(ours, folder / "a"), 2, 0.0),
-    "VTU that stands still": (lambda ours, folder: as_vtu(ours, folder / "a", True), 2, 1e-16),
-    "pattern": (lambda ours, folder: as_vtu(ours, folder / "a") / "step*.vtu", 2, 0.0),
-    "PVD": (lambda ours, folder: as_pvd(ours, folder / "a"), 2, 0.0),
-}
-
-
-@pytest.mark.parametrize("form", FORMS)
-def test_every_form_holds_the_same_positions(ours, tmp_path, form):
-    write, steps, near = FORMS[form]
-    run = judged(write(ours, tmp_path))
-    assert run.record.attributes["frames"] == steps
-    expected = judged(ours.npz(tmp_path / "a.npz"))
-    assert np.abs(run.field("snapshots") - expected.field("snapshots")).max() <= near
-    assert np.isnan(run.force).all()  # they hold none
 
 
 def test_tables_and_charts_show_an_entry_and_ours(organbench, ours, reference, results, scene_file, tmp_path):
@@ -165,7 +98,7 @@ def test_an_entry_cannot_be_replayed(organbench, refused, ours, scene_file, tmp_
 def test_an_entry_inside_out_says_so(ours, tmp_path):
     x = ours.positions.copy()
     x[-1] *= [1.0, 1.0, -1.0]
-    assert judged(ours.with_positions(tmp_path / "a.npz", x)).record.status == Status.INVERTED
+    assert judged(ours.npz(tmp_path / "a.npz", positions=x)).record.status == Status.INVERTED
 
 
 def test_without_its_reference_nothing_but_errors_is_left_out(organbench, ours, scene_file, tmp_path):
@@ -198,5 +131,21 @@ def test_the_starter_of_an_export_runs_and_is_accepted_as_a_body_that_did_not_mo
     assert len([line for line in (folder / "solve.py").read_text().splitlines() if line]) <= 25
 
 
-def test_a_body_that_moved_has_no_warning_that_it_stands_still(ours, tmp_path):
-    assert judged(ours.npz(tmp_path / "a.npz")).record.attributes["warnings"] == ""
+OPTIONS = {
+    "'free' is a method of this program": ("--name", "free"),
+    "'a/b' cannot name an entry": ("--name", "a/b"),
+    "give a positive number": ("--seconds", -1),
+    "a.npz already has the force; leave out force.csv": ("--force", "force.csv"),
+    "there is no file": ("--name", "mine", "--force", "none.csv"),
+}
+
+
+@pytest.mark.parametrize("message", OPTIONS)
+def test_names_times_and_forces_that_are_none_are_refused(refused, ours, scene_file, tmp_path, monkeypatch, message):
+    monkeypatch.chdir(tmp_path)
+    Path("force.csv").write_text("t,force\n0,0\n")
+    path = ours.npz(tmp_path / "a.npz", **({"force": None} if "none.csv" in OPTIONS[message] else {}))
+    assert message in refused("judge", scene_file, path, "--nodes", NODES, *OPTIONS[message])
+    path = ours.npz(tmp_path / "a.npz", force=None)
+    sentence = refused("judge", scene_file, path, "--nodes", NODES, "--force", "force.csv")
+    assert "force.csv has no force at t = 0.1, 0.2" in sentence

@@ -13,8 +13,10 @@ import pytest
 from massspring import Attachment, ImplicitVolume, Material, Setup, Trajectory, make_clock, simulate, step_limit
 from massspring import tetrahedral_body as body_of
 from studies.base.errors import StudyError
+from studies.exchange.description import judged_metrics
 from studies.exchange.entry import entries_beside
 from studies.exchange.export import export
+from studies.exchange.judge import judge
 from studies.exchange.meshes import given_mesh, given_scene, reference_of
 from studies.geometry.mesh.organ_mesh import boundary_triangles, tetrahedron_volumes
 from studies.metrics.metrics import force_end, mean_error, opening_error
@@ -27,7 +29,6 @@ from studies.scene.library import BALL_BISECTED, BALL_INCISED, BALL_SQUEEZE
 from studies.scene.library.ball_incised import RADIUS
 from studies.scene.library.liver_cut_live import LIVER_CUT_LIVE
 from studies.scene.library.shell_opened import SHELL_OPENED
-from studies.store.record import read_record
 
 pytestmark = pytest.mark.slow
 NODES = 150
@@ -121,40 +122,30 @@ def test_a_reader_finds_both_faces_of_the_cut(folder):
 def test_the_page_says_that_the_cut_is_there_from_the_start(folder):
     page, data = (folder / "README.md").read_text(), json.loads((folder / "scene.json").read_text())
     assert data["checkpoints"] == [2.0, 4.0] and "positions are judged at 2, 4 s" in page
-    for phrase in ("cut from the start", "cut_curved.csv", "opening_error", "piece_worst", "until t = 1 s"):
-        assert phrase in page
+    assert all(name in page for name in ("cut from the start", "cut_curved.csv", "opening_error", "piece_worst"))
     assert "cut_energy" not in page and "cut_ms" not in page  # of our own event
 
 
-def printed_metrics(out: str) -> dict[str, float]:
-    """The metrics that `judge` prints."""
-    rows = [line.split() for line in out.splitlines() if line.startswith("  ")]
-    return {name: float(value.replace("−", "-")) for name, value, *_ in rows}
-
-
-def test_an_entry_is_judged_by_its_opening_too(organbench, outsider, cut_body, tmp_path):
+def test_an_entry_is_judged_by_its_opening_too(outsider, cut_body, tmp_path):
+    """With the same numbers as the body that was cut on the way, which the whole reference judges."""
     t, positions, force = outsider
     np.savez(tmp_path / "theirs.npz", t=t, positions=positions, force=force)
-    results = tmp_path / "results"
-    words = ("judge", "--nodes", NODES, "--results", results, "ball_incised")
-    code, out, err = organbench(*words, tmp_path / "theirs.npz")
-    assert code == 0 and not err
-    metrics = printed_metrics(out)
-    assert {"opening_error", "force_error", "mean_error", "overlap", "piece_worst"} <= set(metrics)
-    (file,) = (results / "entries").glob("*.h5")
-    (run,), problems = entries_beside(results, [BALL_INCISED], lambda scene: reference_for(results, scene))
-    assert not problems and run.record.name == read_record(file).name
-    # The same numbers as of the body that was cut on the way, which the whole reference judges.
+    run = judge(BALL_INCISED, tmp_path / "theirs.npz", tmp_path, nodes=NODES)
+    (stored,), problems = entries_beside(tmp_path, [BALL_INCISED], lambda scene: reference_for(tmp_path, scene))
+    assert not problems and stored.record.name == run.record.name and {"overlap", "piece_worst"} <= names_of(run)
     for metric in (opening_error, mean_error, force_end):
-        assert metric(run) == pytest.approx(metric(cut_body), rel=1e-3)
-    assert metrics["opening_error"] == pytest.approx(opening_error(cut_body), rel=0.1)
+        assert metric(run) == metric(stored) == pytest.approx(metric(cut_body), rel=1e-3)
     # Shut, it lacks the whole opening.
-    wrong = positions.copy()
-    wrong[:, run.cut_pairs[:, 1]] = wrong[:, run.cut_pairs[:, 0]]
-    np.savez(tmp_path / "wrong.npz", t=t, positions=wrong, force=2 * force)
-    code, out, _ = organbench(*words, tmp_path / "wrong.npz")
-    assert printed_metrics(out)["opening_error"] == pytest.approx(100.0, abs=0.5)
-    assert printed_metrics(out)["force_end"] > 80.0
+    positions = positions.copy()
+    positions[:, run.cut_pairs[:, 1]] = positions[:, run.cut_pairs[:, 0]]
+    np.savez(tmp_path / "wrong.npz", t=t, positions=positions, force=2 * force)
+    wrong = judge(BALL_INCISED, tmp_path / "wrong.npz", tmp_path, nodes=NODES)
+    assert opening_error(wrong) == pytest.approx(100.0, abs=0.5) and force_end(wrong) > 80.0
+
+
+def names_of(run: Run) -> set[str]:
+    """Metrics that are judged and have a value."""
+    return {metric.name for metric in judged_metrics(run.case.scene) if metric(run) == metric(run)}
 
 
 def test_a_reader_that_joins_points_is_refused(refused, outsider, tmp_path, mesh_cache):
@@ -184,21 +175,20 @@ def test_pieces_keep_a_volume_each(mesh_cache):
         assert mesh.volumes.measure(mesh.points) == pytest.approx([half, half], rel=0.07)
 
 
-def test_a_cut_whose_time_matters_is_not_given_away(tmp_path):
-    loose = replace(BALL_BISECTED, held=BALL_BISECTED.held[:1], cuts=(replace(BALL_BISECTED.cut, free=True),))
-    with pytest.raises(StudyError, match="cut 'section' lets a piece go, so its time matters"):
-        export(loose, tmp_path / "loose", NODES)
-    assert not (tmp_path / "loose").exists()
-    with pytest.raises(StudyError, match="cut 'opening' opens a lumen, whose volume is kept until then"):
-        export(SHELL_OPENED, tmp_path / "shell", NODES)
-    assert not (tmp_path / "shell").exists()
+LOOSE = replace(BALL_BISECTED, held=BALL_BISECTED.held[:1], cuts=(replace(BALL_BISECTED.cut, free=True),))
+LATE = replace(BALL_INCISED, reference=None, cuts=(replace(BALL_INCISED.cut, at=9.0),))
+KEPT = {
+    "cut 'section' lets a piece go, so its time matters": LOOSE,
+    "cut 'opening' opens a lumen, whose volume is kept until then": SHELL_OPENED,
+    "has no checkpoint after its cut 'incision' at 9 s; add one": LATE,
+}
 
 
-def test_a_cut_after_the_last_checkpoint_is_not_given_away(tmp_path):
-    late = replace(BALL_INCISED, reference=None, cuts=(replace(BALL_INCISED.cut, at=9.0),))
-    with pytest.raises(StudyError, match="has no checkpoint after its cut 'incision' at 9 s; add one"):
-        export(late, tmp_path / "late", NODES)
-    assert not (tmp_path / "late").exists()
+@pytest.mark.parametrize("message", KEPT)
+def test_a_cut_whose_time_matters_is_not_given_away(tmp_path, message):
+    with pytest.raises(StudyError, match=message):
+        export(KEPT[message], tmp_path / "kept", NODES)
+    assert not (tmp_path / "kept").exists()
 
 
 def test_what_comes_while_a_cut_advances_is_left_out():
