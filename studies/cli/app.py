@@ -16,10 +16,12 @@ from massspring.errors import MassSpringError
 from reference_fem.errors import SolveError
 from studies.base import interrupts
 from studies.base.errors import StudyError
-from studies.cli.loading import Commands
+from studies.cli.groups import Commands, add_commands
 from studies.cli.terminal import errors, say
+from studies.runs.user_code import AGAIN, fault_of
 
 app = typer.Typer(cls=Commands, no_args_is_help=True, pretty_exceptions_enable=False)
+add_commands(app)
 TRACEBACK = "ORGANBENCH_TRACEBACK"
 """An environment variable for developers: set, an unforeseen error ends in its traceback."""
 
@@ -76,8 +78,6 @@ def message(error: Exception) -> str:
     """The sentence for an error."""
     if isinstance(error, (StudyError, MassSpringError, SolveError)):
         return str(error)
-    from studies.runs.user_code import AGAIN, fault_of  # half a second, for an error alone
-
     fault = fault_of(error)
     if fault is not None:
         return fault + AGAIN

@@ -5,8 +5,10 @@ from collections import Counter
 from pathlib import Path
 from typing import Any
 
+import typer
+
 from studies.base.atomic import write_whole
-from studies.cli.loading import GROUPS, LINES, loaded
+from studies.cli.app import app
 from studies.cli.terminal import PROGRAM
 
 PAGE = Path(__file__).parents[2] / "docs/commands.md"
@@ -20,19 +22,19 @@ for a study or a scene. {PROGRAM} ([SECURITY.md](../SECURITY.md))."""
 
 def commands_page() -> str:
     """The page as Markdown."""
-    commands = {name: loaded(name) for name in LINES}
+    commands = typer.main.get_command(app).commands  # type: ignore[attr-defined]
     items = {name: [_item(param) for param in command.params] for name, command in commands.items()}
     counts = Counter(item for command in items.values() for item in command)
     shared = [item for item, count in counts.items() if count >= SEVERAL]
     parts = [HEAD]
-    for group, lines in GROUPS.items():
-        parts.append(f"## {group}")
-        for name in lines:
-            usage = " ".join(["organbench", name, *filter(None, map(_usage, commands[name].params))])
-            also = [item.split(": ")[0].removeprefix("- ") for item in items[name] if item in shared]
-            more = f" Also {', '.join(also)}." if also else ""
-            parts.append(_wrapped(f"**`{usage}`** {commands[name].help}{more}"))
-            parts.append("\n".join(_wrapped(item) for item in items[name] if item not in shared))
+    for name, command in commands.items():
+        if f"## {command.rich_help_panel}" not in parts:
+            parts.append(f"## {command.rich_help_panel}")
+        usage = " ".join(["organbench", name, *filter(None, map(_usage, command.params))])
+        also = [item.split(": ")[0].removeprefix("- ") for item in items[name] if item in shared]
+        more = f" Also {', '.join(also)}." if also else ""
+        parts.append(_wrapped(f"**`{usage}`** {command.help}{more}"))
+        parts.append("\n".join(_wrapped(item) for item in items[name] if item not in shared))
     parts += ["## Arguments and options of several commands", "\n".join(map(_wrapped, shared))]
     return "\n\n".join(filter(None, parts)) + "\n"
 

@@ -11,6 +11,8 @@ from rich.console import Console, ConsoleOptions, RenderableType
 from rich.segment import Segment
 
 from studies.base.errors import StudyError
+from studies.catalog import STUDIES
+from studies.scene.library import CUT, SCENES
 
 STEERING = {"Cc", "Cf", "Cs"}
 """Categories of Unicode whose characters steer a terminal, or the direction of a text, and have no shape."""
@@ -57,15 +59,11 @@ PROGRAM = "FILE.py is a program: run only files you trust"
 
 def studies(incomplete: str) -> list[str]:
     """Names that a shell completes."""
-    from studies.catalog import STUDIES  # with what each command loads anyway, but not the list of commands
-
     return [study.name for study in STUDIES if study.name.startswith(incomplete)]
 
 
 def scenes(incomplete: str) -> list[str]:
     """Names that a shell completes."""
-    from studies.scene.library import CUT, SCENES  # as above
-
     return [scene.name for scene in (*SCENES, *CUT) if scene.name.startswith(incomplete)]
 
 

@@ -2,8 +2,6 @@
 
 import ast
 import pickle
-import subprocess
-import sys
 from importlib import import_module
 from pathlib import Path
 
@@ -52,19 +50,6 @@ def test_every_method_is_exported():
 def test_an_unknown_name_is_an_attribute_error(package):
     with pytest.raises(AttributeError, match=f"No {package} attribute Bodyy"):
         _ = import_module(package).Bodyy
-
-
-HEAVY = ("gmsh", "h5py", "matplotlib", "meshio", "numba", "pandas", "scipy", "skfem", "skimage")
-
-
-def test_the_list_of_commands_loads_none_of_them():
-    program = (
-        "import sys\nfrom studies.cli import app\nsys.argv = ['organbench', '--help']\n"
-        "try:\n    app.main()\nexcept SystemExit:\n    pass\n"
-        f"sys.exit(' '.join(name for name in {HEAVY!r} if name in sys.modules) or 0)"
-    )
-    done = subprocess.run([sys.executable, "-c", program], cwd=REPOSITORY, capture_output=True, text=True, check=False)
-    assert (done.returncode, done.stderr.strip()) == (0, ""), "loading all takes seconds"
 
 
 def test_every_chart_of_the_catalogue_is_listed():

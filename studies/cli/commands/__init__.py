@@ -1,1 +1,1 @@
-"""Commands, one per module; studies.cli.loading loads the one that is called."""
+"""Commands, one per module; studies.cli.groups loads the one that is called."""

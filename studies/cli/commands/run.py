@@ -182,9 +182,7 @@ class Work:
         for sentence in causes(odd):
             say(f"  {sentence}")
         if study.name not in {each.name for each in STUDIES}:
-            for verdict in verdicts(load_runs(root, study)[0]):
-                answer = "yes" if verdict.trusted else "no: use more nodes"
-                say(f"{verdict.scene}: trust its best body: {answer}, because {verdict.why}")
+            say_trust(root, study)
         return not odd
 
     def time_again(self, dry: bool) -> None:
@@ -201,3 +199,10 @@ class Work:
         if self.drawn:
             warn(refresh(self.ledger, self.study)[1])
         say(f"{name}: {count} stored cases were timed again, {'charts' if self.drawn else 'times'} in {self.folder}")
+
+
+def say_trust(root: Path, study: Study) -> None:
+    """Whether two meshes of a scene without a reference agree."""
+    for verdict in verdicts(load_runs(root, study)[0]):
+        answer = "yes" if verdict.trusted else "no: use more nodes"
+        say(f"{verdict.scene}: trust its best body: {answer}, because {verdict.why}")

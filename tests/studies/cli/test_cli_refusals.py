@@ -65,10 +65,10 @@ def test_unknown_words_get_the_nearest_match(refused, tmp_path, monkeypatch, wor
 
 
 def test_an_unforeseen_error_is_one_sentence_that_names_the_file_of_its_traceback(refused, monkeypatch, tmp_path):
-    def unforeseen():
+    def unforeseen(*words, **options):
         raise TypeError("two words\nand a second line")
 
-    monkeypatch.setattr(list_command, "list", unforeseen)
+    monkeypatch.setattr(list_command, "Table", unforeseen)
     with pytest.raises(TypeError):
         refused("list")  # of developers, whose variable is set
     monkeypatch.setattr(cli, "TRACEBACK", "ORGANBENCH_NOT_SET")
@@ -80,7 +80,7 @@ def test_an_unforeseen_error_is_one_sentence_that_names_the_file_of_its_tracebac
 
 
 def test_a_traceback_that_cannot_be_written_is_printed(organbench, monkeypatch, tmp_path):
-    monkeypatch.setattr(list_command, "list", lambda: 1 / 0)
+    monkeypatch.setattr(list_command, "Table", lambda *words, **options: 1 / 0)
     monkeypatch.setattr(cli, "TRACEBACK", "ORGANBENCH_NOT_SET")
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "none"))
     code, _, err = organbench("list")

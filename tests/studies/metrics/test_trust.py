@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from studies.catalog.of_scene import study_of
-from studies.cli.commands.run import _say_trust
+from studies.cli.commands.run import say_trust
 from studies.geometry import HalfSpace
 from studies.meshing.kept_shape import tell_shape
 from studies.metrics.trust import FEW_FACETS, Apart, apart, doubt, verdicts, within
@@ -136,6 +136,6 @@ def test_one_mesh_is_no_verdict_and_a_failed_run_none():
 @pytest.mark.parametrize(("shift", "answer"), [(0.9999, "yes"), (0.9, "no: use more nodes")])
 def test_a_run_of_a_scene_ends_with_the_verdict(monkeypatch, capsys, shift, answer):
     runs = [body_run(COARSE, shift=shift), body_run(FINE)]
-    monkeypatch.setattr("studies.sweep.load.load_runs", lambda root, study: (runs, []))
-    _say_trust(Path(), tiny_study())
+    monkeypatch.setattr("studies.cli.commands.run.load_runs", lambda root, study: (runs, []))
+    say_trust(Path(), tiny_study())
     assert f"ball_clamped: trust its best body: {answer}, because two meshes" in capsys.readouterr().out
