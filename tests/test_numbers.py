@@ -3,6 +3,7 @@
 A row: a page or several, words of it in which each # is a number and each @ a name, and what these are by the tables.
 """
 
+import json
 import re
 from collections.abc import Iterable
 from functools import cache
@@ -39,6 +40,7 @@ APART = ["element bulk_modulus1e+06 hard", "xpbd"]
 LINEAR = ["bullet", "drake", "mujoco", "newton"]
 TARGETS = {"stomach": (6.0, 3.0), "bladder": (6.0, 3.0)}
 """Of hollow organs, force and mean displacement [%]; of others 3 and 1."""
+NU = {"mujoco": " (Poisson's ratio 0.45)"}
 COPIED = {
     "docs/findings.md": ("summary.md", "accuracy/recommended.md"),
 }
@@ -276,6 +278,18 @@ OPENED = (("ball_incised", 794), ("ball_incised", 994), ("liver_incised", 994), 
 VIRTUAL = [("tetrahedral", 350), (NODAL, 350), ("tetrahedral", 700)]
 
 
+def halved_steps() -> tuple[float, float]:
+    """Most by which half the step changes a force of the sweep, of all programs but Drake and of Drake."""
+    forces = rows("league", "sweep").set_index(["engine", "settings", "scene"])[FORCE]
+    changes = dict[str, list[float]]()
+    for (engine, settings, scene), force in forces.items():
+        chosen = json.loads(settings)
+        if chosen.pop("step", None):
+            changes.setdefault(engine, []).append(abs(force - forces[engine, json.dumps(chosen), scene]))
+    drake = max(changes.pop("drake"))
+    return max(map(max, changes.values())), drake
+
+
 def opened(head: str, cell: str, *columns: str) -> tuple:
     """A line of the table of adaptive bodies that gape."""
     return (CUTTING, f"| {head} | {' | '.join([cell] * len(OPENED))} |", lambda: [
@@ -355,6 +369,10 @@ ROWS = [
     opened("times real time", "#", SPEED),
     opened("rest shape / size", "# %", DISTANCE),
     ("docs/league.md", "needs # to # s for", lambda: span(of(rows("league"), engine="ours-quadratic")["cost [s/s]"])),
+    ("docs/league.md", "PyBullet by at most # percentage points and those of Drake by #.", halved_steps),
+    *(("docs/silicone.md", f"| {who}{NU.get(who, '')} | #, #, # | #, #, # | #, #, # |",
+        lambda who=who: of(rows("silicone"), who=who).iloc[:, 2:].to_numpy().ravel().tolist())
+      for who in rows("silicone")["who"].unique()),
     (CUTTING, "| paper's surface body, 350 surface nodes | – | #, #, # |",
         lambda: cutting("surface", 350, "kidney_bisected", FORCE, MEAN, OPENING)),
     *((CUTTING, f"| {words}, {nodes} | #, #, # | #, #, # |", lambda body=body, nodes=nodes: [
