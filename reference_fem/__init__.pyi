@@ -8,8 +8,6 @@ from .elements.evaluate import Evaluator as Evaluator
 from .elements.shapes import facet_nodes as facet_nodes
 from .elements.shapes import nodes as nodes
 from .elements.shapes import surface_triangles as surface_triangles
-from .elements.table import ELEMENTS as ELEMENTS
-from .elements.table import Element as Element
 from .errors import SlowSolverWarning as SlowSolverWarning
 from .errors import SolveError as SolveError
 from .model.cavity import Cavity as Cavity

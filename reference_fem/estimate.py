@@ -21,9 +21,9 @@ def stress_indicator(system: System, x: np.ndarray) -> np.ndarray:
     sum is 20 to 35 times that error (docs/theory.md, section 6).
     """
     mesh, weights = system.problem.mesh, system.elements.weights
-    F, p = assembly.deformation(x[: system.field_count], system.elements, system.problem.material.kappa)
+    F, p = assembly.deformation(x[: system.field_count], system.elements)
     P = system.problem.material.stress(F, p).reshape(*weights.shape, 9)
-    points, _ = get_quadrature(RefTet, system.problem.degree)
+    points, _ = get_quadrature(RefTet, system.problem.order)
     shapes, _ = basis_table(ElementTetP2(), points)
     y = np.einsum("qn,eni->eqi", shapes, nodes(mesh)[element_nodes(mesh)])
     corners = mesh.t[:4].T

@@ -21,11 +21,6 @@ BALL_BETWEEN_PLANES = {
 over 2R -> (force / (mu R²), equator radius / R); two meshes agree to 1e-4."""
 
 
-def uniaxial_force(mu: float, area: float, stretch: float):
-    """Force [N] on an incompressible block of rest cross-section `area` [m²]: mu A (s - s^-2)."""
-    return mu * area * (stretch - stretch**-2)
-
-
 def principal_stress(material: Any, stretches: Sequence[float], axis: int):
     """Nominal stress [Pa] along `axis` of a body stretched by three principal stretches, p = kappa (J - 1).
 

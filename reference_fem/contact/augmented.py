@@ -207,24 +207,6 @@ def renewed_grip(touch: Touch, sticks: np.ndarray, surface: Surface, x: np.ndarr
     return Grip(stuck, np.where(kept, old.anchor, here), np.where(kept, touch.traction, 0.0))
 
 
-def potential(x: np.ndarray, surface: Surface, touch: Touch):
-    """sum w (t² - m² + T² - m_T²) / (2 eps) [J] in plain NumPy, independent of the kernel, to check it."""
-    y, total, eps = point_positions(x, surface), 0.0, touch.penalty[:, None]
-    for o, (row, m) in enumerate(zip(touch.rows, touch.multiplier, strict=True)):
-        t = np.maximum(0.0, m - eps * gaps(row, y))
-        total += np.sum(surface.weights * (t**2 - m**2) / (2.0 * eps))
-        if o < len(touch.grip.stuck):
-            anchor, hold = touch.grip.anchor[o], touch.grip.traction[o]
-            slip = y - row[1:4] - anchor
-            ahead = np.stack([gaps(row, row[1:4] + anchor + 1e-6 * e) for e in np.eye(3)], axis=-1)
-            behind = np.stack([gaps(row, row[1:4] + anchor - 1e-6 * e) for e in np.eye(3)], axis=-1)
-            n = (ahead - behind) / 2e-6
-            slip = slip - np.sum(slip * n, axis=-1, keepdims=True) * n
-            share = np.sum((hold - eps[..., None] * slip) ** 2 - hold**2, axis=-1) / (2.0 * eps)
-            total += np.sum(surface.weights * share, where=touch.grip.stuck[o] & (t > 0.0))
-    return float(total)
-
-
 def penetration(touch: Touch):
     """Deepest point inside an obstacle [m], from t = m - eps g where t > 0."""
     depth = (touch.pressure - touch.multiplier) / touch.penalty[:, None]

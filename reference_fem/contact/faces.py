@@ -21,7 +21,7 @@ SAME_POINT = 1e-9
 
 
 class Faces(NamedTuple):
-    """Tables of the faces of a cut for the kernel: nf pairs of facets with six (or three) nodes, nq points each."""
+    """Tables of the faces of a cut for the kernel: nf pairs of facets, nq points each."""
 
     dofs: np.ndarray
     """Unknowns of the nodes behind the cut (u_x first, then u_y, u_z), then of those in front, (nf, 36) uint32."""
@@ -223,13 +223,6 @@ def gaps_and_slopes(x: np.ndarray, faces: Faces) -> tuple[np.ndarray, np.ndarray
     push = np.einsum("qa,fqi->fqia", faces.values, n)
     both = np.concatenate([0.5 * turned - push, 0.5 * turned + push], axis=2)
     return g, both.reshape(*g.shape, 6 * count)
-
-
-def potential_of_faces(x: np.ndarray, faces: Faces, touch: FaceTouch) -> float:
-    """sum w (t² - m²) / (2 eps) [J] in plain NumPy, independent of the kernel, to check it."""
-    eps = touch.penalty[:, None]
-    t = np.maximum(0.0, touch.multiplier - eps * gaps_and_slopes(x, faces)[0])
-    return float(np.sum(faces.weights * (t**2 - touch.multiplier**2) / (2.0 * eps)))
 
 
 def no_faces(points: int, functions: int) -> Faces:

@@ -4,11 +4,11 @@ from typing import NamedTuple
 
 import numpy as np
 import scipy.sparse as sp
+from skfem import ElementTetP2
 from skfem.quadrature import get_quadrature
 from skfem.refdom import RefTet
 
 from reference_fem.elements.shapes import Elements, basis_table
-from reference_fem.elements.table import Element
 from reference_fem.system.saddle_point import System
 
 
@@ -25,16 +25,16 @@ class Mass(NamedTuple):
         return self.matrix @ field
 
 
-def element_masses(element: Element, elements: Elements, density: float, order: int):
-    """rho integral N_a N_b of every element, (ne, nu, nu) [kg]; for P2 exact at order 4 on straight elements."""
-    values, _ = basis_table(element.displacement, get_quadrature(RefTet, order)[0])
+def element_masses(elements: Elements, density: float, order: int):
+    """rho integral N_a N_b of every element, (ne, nu, nu) [kg]; exact at order 4 on straight elements."""
+    values, _ = basis_table(ElementTetP2(), get_quadrature(RefTet, order)[0])
     return density * np.einsum("eq,qa,qb->eab", elements.weights, values, values)
 
 
 def build_mass(system: System) -> Mass:
     """Consistent mass of a system, by the quadrature of its elements."""
     problem, elements = system.problem, system.elements
-    local = element_masses(system.element, elements, problem.density, problem.degree)
+    local = element_masses(elements, problem.density, problem.order)
     count, width = len(system.nodes), len(elements.sizes.functions)
     table = elements.dofs[:, :width].astype(np.int64) // 3
     for hung in problem.masses:

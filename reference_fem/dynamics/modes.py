@@ -7,7 +7,6 @@ import scipy.sparse as sp
 from scipy.sparse.linalg import LinearOperator, eigsh
 
 from reference_fem.dynamics.inertia import MovingSystem
-from reference_fem.elements.shapes import at_nodes
 from reference_fem.errors import SolveError
 from reference_fem.model.problem import Problem
 from reference_fem.system.checks import rigid_freedoms
@@ -57,8 +56,7 @@ def natural_frequencies(problem: Problem, count: int, solver: str = "auto") -> M
     shapes = np.zeros((rigid + count, n))
     shapes[:, free] = vectors.T
     # round-off leaves a rigid motion's omega² at either side of zero
-    fields = [at_nodes(problem.mesh, system.element, shape.reshape(-1, 3)) for shape in shapes]
-    return Modes(np.sqrt(np.maximum(values, 0.0)), np.array(fields), rigid)
+    return Modes(np.sqrt(np.maximum(values, 0.0)), shapes.reshape(len(shapes), -1, 3), rigid)
 
 
 def lowest(system: MovingSystem, free: np.ndarray, count: int):

@@ -5,11 +5,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike
-from skfem import ElementTetP2
 
 from reference_fem.dynamics.inertia import MovingSystem, scheme
 from reference_fem.dynamics.march import March, kinetic
-from reference_fem.elements.table import find_element
 from reference_fem.errors import SolveError
 from reference_fem.model.problem import Problem
 from reference_fem.statics.equilibrium import Equilibrium, describe
@@ -77,7 +75,10 @@ def motion_path(
     settings = settings or DynamicsSettings()
     begin = settings.newton.start
     times = check_times(times, begin)
-    check_element(problem)
+    if problem.faces_touch:
+        raise SolveError(
+            "a motion in which the faces of a cut touch is asked for: follow a load path, or let them pass"
+        )
     system = MovingSystem(problem, settings.newton, settings.damping)
     march = March(system, scheme(settings.rho_inf), settings.dt)
     path: list[Moment] = []
@@ -95,16 +96,6 @@ def motion_path(
     return path
 
 
-def check_element(problem: Problem):
-    """Refuse elements whose displacement is not given at the P2 nodes, where a motion starts, and touching faces."""
-    if problem.faces_touch:
-        raise SolveError(
-            "a motion in which the faces of a cut touch is asked for: follow a load path, or let them pass"
-        )
-    if not isinstance(find_element(problem.element).displacement, ElementTetP2):
-        raise SolveError(f"a motion with the element {problem.element!r} is asked for: use 'P2/P1' or 'P2/P0'")
-
-
 def given_start(system: MovingSystem, velocity0: ArrayLike | None, start: Equilibrium | None):
     """(State, velocities (3 N2,)) that a motion begins with."""
     shape, state = system.nodes.shape, system.rest()
@@ -113,8 +104,7 @@ def given_start(system: MovingSystem, velocity0: ArrayLike | None, start: Equili
             raise SolveError(
                 f"the start has {len(start.u)} nodes but the mesh {shape[0]}: start from an equilibrium on this mesh"
             )
-        given = np.concatenate((start.u.ravel(), start.p))
-        state.x[: system.field_count] = given[: system.field_count]
+        state.x[: system.field_count] = np.concatenate((start.u.ravel(), start.p))
     given = np.asarray(0.0 if velocity0 is None else velocity0, dtype=float)
     if given.shape not in ((), (3,), shape) or not np.isfinite(given).all():
         raise SolveError(f"the start velocities have shape {given.shape}: give finite values [m/s], (3,) or {shape}")

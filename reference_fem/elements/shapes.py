@@ -1,19 +1,18 @@
-"""Elements on one mesh: their unknowns, reference tables and geometry, from scikit-fem.
-
-Whatever the element, the mesh gives ten nodes to a tetrahedron and results are reported at them (`nodes`).
-"""
+"""Taylor and Hood's P2/P1 elements on one mesh: their unknowns, reference tables and geometry, from scikit-fem."""
 
 from typing import Any, NamedTuple
 
 import numpy as np
-from skfem import ElementTetMini, ElementTetP2, ElementTriP2, MeshTet
+from skfem import ElementTetP1, ElementTetP2, ElementTriP2, MeshTet
 from skfem.assembly import Dofs
 from skfem.quadrature import get_quadrature
 from skfem.refdom import RefTet, RefTri
 
-from reference_fem.elements.table import DEFAULT, ELEMENTS, Element
 from reference_fem.errors import SolveError
 
+ORDER = 5
+"""Degree that is integrated exactly: the lowest with positive weights that keeps the rates, and at least 4, which p J
+needs."""
 FACET_EDGES = ((0, 1), (1, 2), (0, 2))
 """Vertex pairs of the mid-side nodes 3, 4, 5 of a six-node triangle."""
 
@@ -21,15 +20,13 @@ FACET_EDGES = ((0, 1), (1, 2), (0, 2))
 class Sizes(NamedTuple):
     """Lengths as tuples of zeros: the compiler knows the length of a tuple, not that of an array, and can unroll loops.
 
-    Pass them to inner functions one by one: all three together slow the assembly by a fifth.
+    Pass them to inner functions one by one: both together slow the assembly by a fifth.
     """
 
     functions: tuple
-    """nu displacement functions."""
+    """nu displacement functions, 10."""
     pressures: tuple
-    """np pressure functions."""
-    unknowns: tuple
-    """Unknowns of an element, as many as columns of `dofs`."""
+    """np pressure functions, 4."""
 
 
 class Elements(NamedTuple):
@@ -39,7 +36,7 @@ class Elements(NamedTuple):
     """
 
     dofs: np.ndarray
-    """Global unknown of each local one, (ne, 3 nu + np) uint32; (ne, 3 nu) when the pressure is eliminated."""
+    """Global unknown of each local one, (ne, 3 nu + np) uint32."""
     gradients: np.ndarray
     """Rest gradients of the displacement functions, (ne, nq, 3, nu) [1/m]."""
     pressures: np.ndarray
@@ -53,9 +50,11 @@ class Facets(NamedTuple):
     """Boundary facets, turned outward, for `nf` facets and `nq` points each."""
 
     nodes: np.ndarray
-    """Three vertices, then the mid-side nodes of FACET_EDGES, (nf, 6); without those for linear facets, (nf, 3)."""
+    """Three vertices, then the mid-side nodes of FACET_EDGES, (nf, 6)."""
     values: np.ndarray
-    """Values of the six (or three) functions, (nq, 6)."""
+    """Values of the six functions, (nq, 6)."""
+    slopes: np.ndarray
+    """Their two derivatives, (nq, 2, 6)."""
     weights: np.ndarray
     """Rest area of each quadrature point, (nf, nq) [m²]."""
 
@@ -82,64 +81,22 @@ def nodes(mesh: MeshTet) -> np.ndarray:
     return np.ascontiguousarray(np.hstack((mesh.p, middles)).T)
 
 
-def displacement_table(mesh: MeshTet, element: Element) -> np.ndarray:
-    """Numbers of each element's displacement functions, (ne, nu): vertices first, then mid-side nodes or bubbles."""
-    return np.asarray(Dofs(mesh, element.displacement).element_dofs).T
-
-
-def displacement_points(mesh: MeshTet, element: Element) -> np.ndarray:
-    """Rest positions that belong to the displacement functions, (n, 3) [m]: nodes, or the centre for a bubble."""
-    if isinstance(element.displacement, ElementTetP2):
-        return nodes(mesh)
-    points = nodes(mesh)[: mesh.nvertices]
-    if isinstance(element.displacement, ElementTetMini):
-        points = np.vstack((points, points[mesh.t[:4]].mean(axis=0)))
-    return points
-
-
-def at_nodes(mesh: MeshTet, element: Element, values: np.ndarray) -> np.ndarray:
-    """A displacement field (n, 3) at the P2 nodes, (N2, 3); mid-side nodes of a linear field lie between two vertices,
-    and a bubble is zero there."""
-    if isinstance(element.displacement, ElementTetP2):
-        return values
-    corners = values[: mesh.nvertices]
-    return np.vstack((corners, corners[mesh.edges].mean(axis=0)))
-
-
-def forces_at_nodes(mesh: MeshTet, element: Element, forces: np.ndarray):
-    """Forces on the displacement functions (n, 3) as forces on the P2 nodes, (N2, 3) [N]; bubbles carry none."""
-    if isinstance(element.displacement, ElementTetP2):
-        return forces
-    return np.vstack((forces[: mesh.nvertices], np.zeros((len(nodes(mesh)) - mesh.nvertices, 3))))
-
-
-def build_elements(mesh: MeshTet, order: int, element: Element = ELEMENTS[DEFAULT]) -> Elements:
+def build_elements(mesh: MeshTet, order: int) -> Elements:
     """Tables of every element; raises SolveError for folded or flat elements.
 
     order: degree that the quadrature integrates exactly; P2 displacements enter J as a cubic and p J as a quartic.
     """
     points, w = get_quadrature(RefTet, order)
     _, shape = basis_table(ElementTetP2(), points)
-    _, local = basis_table(element.displacement, points)
-    x = nodes(mesh)
-    jacobian = np.einsum("eni,qJn->eqiJ", x[element_nodes(mesh)], shape)
+    table = element_nodes(mesh)
+    jacobian = np.einsum("eni,qJn->eqiJ", nodes(mesh)[table], shape)
     det = np.linalg.det(jacobian)
     check_shapes(det)
-    gradients = np.einsum("eqJi,qJn->eqin", np.linalg.inv(jacobian), local)
-    table = displacement_table(mesh, element)
-    dofs, pressures = [3 * table + c for c in range(3)], np.ones((len(w), 1))
-    if element.pressure is not None:
-        dofs.append(3 * (table.max() + 1) + mesh.t[:4].T)
-        pressures, _ = basis_table(element.pressure, points)
-    unknowns = np.hstack(dofs).astype(np.uint32)
-    sizes = Sizes(*((0,) * n for n in (table.shape[1], pressures.shape[1], unknowns.shape[1])))
-    return Elements(
-        dofs=unknowns,
-        gradients=np.ascontiguousarray(gradients),
-        pressures=pressures,
-        weights=np.abs(det) * w,
-        sizes=sizes,
-    )
+    gradients = np.einsum("eqJi,qJn->eqin", np.linalg.inv(jacobian), shape)
+    dofs = np.hstack([*(3 * table + c for c in range(3)), 3 * (table.max() + 1) + mesh.t[:4].T]).astype(np.uint32)
+    pressures, _ = basis_table(ElementTetP1(), points)
+    sizes = Sizes((0,) * table.shape[1], (0,) * pressures.shape[1])
+    return Elements(dofs, np.ascontiguousarray(gradients), pressures, np.abs(det) * w, sizes)
 
 
 def check_shapes(det: np.ndarray):
@@ -168,7 +125,7 @@ def check_neighbours(mesh: MeshTet):
     The orientation is that of the map of an element, not of its corners: a part of a halved curved element may have
     inverted corners although its map is positive everywhere.
     """
-    _, shape = basis_table(ElementTetP2(), get_quadrature(RefTet, ELEMENTS[DEFAULT].order)[0])
+    _, shape = basis_table(ElementTetP2(), get_quadrature(RefTet, ORDER)[0])
     det = np.linalg.det(np.einsum("eni,qJn->eqiJ", nodes(mesh)[element_nodes(mesh)], shape))
     check_shapes(det)
     sign = np.sign(det[:, 0])
@@ -208,22 +165,16 @@ def edge_index(mesh: MeshTet, pairs: np.ndarray):
     return order[np.searchsorted(keys, pair_keys, sorter=order)]
 
 
-def build_facets(mesh: MeshTet, order: int, element: Element = ELEMENTS[DEFAULT]) -> Facets:
+def build_facets(mesh: MeshTet, order: int) -> Facets:
     """Quadrature on the boundary. Raises SolveError when the order has a rule with negative weights."""
     points, w = get_quadrature(RefTri, order)
     if w.min() <= 0.0:
         raise SolveError(f"the contact order {order} has a rule with negative weights: use 4, 5, 6 or 8")
-    _, local = basis_table(ElementTriP2(), points)
+    values, slopes = basis_table(ElementTriP2(), points)
     table = facet_nodes(mesh)
-    tangents = np.einsum("fni,qJn->fqJi", nodes(mesh)[table], local)
+    tangents = np.einsum("fni,qJn->fqJi", nodes(mesh)[table], slopes)
     area = np.linalg.norm(np.cross(tangents[:, :, 0], tangents[:, :, 1]), axis=2)
-    values, _ = basis_table(element.facet, points)
-    return Facets(table[:, : values.shape[1]], values, area * w)
-
-
-def facet_slopes(order: int, element: Element) -> np.ndarray:
-    """The two derivatives of a facet's functions at the points of `build_facets`, (nq, 2, 6)."""
-    return basis_table(element.facet, get_quadrature(RefTri, order)[0])[1]
+    return Facets(table, values, slopes, area * w)
 
 
 def surface_triangles(mesh: MeshTet) -> np.ndarray:

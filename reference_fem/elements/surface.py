@@ -11,7 +11,7 @@ class Surface(NamedTuple):
     """Tables of the boundary for the contact kernel: nf facets, nq points each."""
 
     dofs: np.ndarray
-    """Unknowns of the six nodes (three, for linear elements), u_x first, then u_y, u_z, (nf, 18) uint32."""
+    """Unknowns of the six nodes, u_x first, then u_y, u_z, (nf, 18) uint32."""
     positions: np.ndarray
     """Slots of the packed upper triangle of 18 x 18, (nf, 171) uint32."""
     rest: np.ndarray

@@ -11,11 +11,12 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
+from skfem import ElementTriP2
 from skfem.quadrature import get_quadrature
 from skfem.refdom import RefTri
 
 from reference_fem.compiled import compiled
-from reference_fem.elements.shapes import basis_table, facet_nodes, nodes
+from reference_fem.elements.shapes import basis_table, nodes
 from reference_fem.elements.surface import scatter
 from reference_fem.errors import SolveError
 
@@ -102,16 +103,16 @@ class Lumen:
         return beyond - np.bincount(dofs.ravel(), area.ravel(), minlength=len(x))
 
 
-def facet_normals(element: Any):
+def facet_normals():
     """N_abc of a facet: integral of phi_a (phi_b,r phi_c,s), (nn, nn, nn)."""
     points, w = get_quadrature(RefTri, 4)  # degree 2 + 1 + 1
-    N, dN = basis_table(element, points)
+    N, dN = basis_table(ElementTriP2(), points)
     return np.einsum("q,qa,qb,qc->abc", w, N, dN[:, 0], dN[:, 1])
 
 
-def facet_shares(element: Any):
+def facet_shares():
     """Triples and their shares C_abc of the cone over one facet: integral of y·(y_r × y_s) / 3, antisymmetrised."""
-    T = facet_normals(element) / 3.0
+    T = facet_normals() / 3.0
     triples = np.array(list(itertools.combinations(range(len(T)), 3)))
     even, odd = ((0, 1, 2), (1, 2, 0), (2, 0, 1)), ((0, 2, 1), (2, 1, 0), (1, 0, 2))
     shares = sum(T[tuple(triples[:, p].T)] for p in even) - sum(T[tuple(triples[:, p].T)] for p in odd)
@@ -153,24 +154,24 @@ def add_wall(x: np.ndarray, wall: Wall, pressure: float, gradient: np.ndarray, v
     return V
 
 
-def find_lumens(problem: Any, pattern: Any, element: Any, table: np.ndarray, held: Sequence[Any]) -> list[Lumen]:
-    """The cavities of a problem on its mesh; table: facet nodes of the element (nf, nn), held: HeldNodes.
+def find_lumens(problem: Any, pattern: Any, table: np.ndarray, held: Sequence[Any]) -> list[Lumen]:
+    """The cavities of a problem on its mesh; table: facet nodes (nf, nn), held: HeldNodes.
 
     Raises SolveError for a wall that has no facet, shares one with another wall, is open, or encloses a negative
     volume.
     """
     x, lumens = nodes(problem.mesh), []
-    corners = facet_nodes(problem.mesh)[:, :3]
+    corners = table[:, :3]
     for number, chosen in enumerate(find_walls(problem.cavities, x[corners].mean(axis=1).T)):
         origin, is_open = wall_origin(number, corners[chosen], x, held)
-        wall = build_wall(problem, pattern, element, table[chosen], origin)
+        wall = build_wall(problem, pattern, table[chosen], origin)
         nothing = np.zeros(len(pattern.rank))
         volume0 = add_wall(nothing, wall, 0.0, nothing.copy(), np.zeros(1), False)
         if volume0 <= 0.0:
             raise SolveError(
                 f"cavity {number} encloses {volume0:.3g} m³ (limit > 0): choose the inner surface of the tissue"
             )
-        normals = -facet_normals(element) if is_open else None
+        normals = -facet_normals() if is_open else None
         lumens.append(Lumen(wall, volume0, problem.cavities[number], number, normals))
     return lumens
 
@@ -196,9 +197,9 @@ def find_walls(cavities: Sequence[Cavity], centroids: np.ndarray):
     return walls
 
 
-def build_wall(problem: Any, pattern: Any, element: Any, table: np.ndarray, origin: np.ndarray) -> Wall:
+def build_wall(problem: Any, pattern: Any, table: np.ndarray, origin: np.ndarray) -> Wall:
     """Tables of the facets in `table` (nf, nn), outward of the tissue and so into the lumen: hence the sign."""
-    triples, shares = facet_shares(element)
+    triples, shares = facet_shares()
     dofs = np.hstack([3 * table + c for c in range(3)])
     rest = np.ascontiguousarray((nodes(problem.mesh) - origin).ravel())
     return Wall(dofs.astype(np.uint32), pattern.positions(dofs), rest, triples, -shares)

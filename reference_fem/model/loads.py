@@ -5,19 +5,15 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from skfem import ElementTetP2, ElementTriP2, MeshTet
+from skfem import ElementTetP2, MeshTet
 from skfem.quadrature import get_quadrature
-from skfem.refdom import RefTet, RefTri
+from skfem.refdom import RefTet
 
 from reference_fem.elements.shapes import (
-    Element,
     basis_table,
     build_elements,
     build_facets,
-    displacement_points,
-    displacement_table,
     element_nodes,
-    facet_nodes,
     nodes,
 )
 from reference_fem.errors import SolveError
@@ -67,25 +63,21 @@ class LoadedPoints(NamedTuple):
     """Number of all displacement functions."""
 
 
-def find_points(load: Traction | BodyForce, mesh: MeshTet, element: Element, order: int) -> LoadedPoints:
+def find_points(load: Traction | BodyForce, mesh: MeshTet, order: int) -> LoadedPoints:
     """Where a load acts on one mesh; raises SolveError for a traction that finds no facet."""
-    x, count = nodes(mesh), len(displacement_points(mesh, element))
+    x = nodes(mesh)
     if isinstance(load, BodyForce):
         points, _ = get_quadrature(RefTet, order)
-        shape, _ = basis_table(ElementTetP2(), points)
-        functions, _ = basis_table(element.displacement, points)
-        positions, weights = x[element_nodes(mesh)], build_elements(mesh, order, element).weights
-        table = displacement_table(mesh, element)
+        functions, _ = basis_table(ElementTetP2(), points)
+        table, weights = element_nodes(mesh), build_elements(mesh, order).weights
     else:
-        facets, corners = build_facets(mesh, order, element), facet_nodes(mesh)
-        chosen = np.asarray(load.where(x[corners[:, :3]].mean(axis=1).T), dtype=bool)
+        facets = build_facets(mesh, order)
+        chosen = np.asarray(load.where(x[facets.nodes[:, :3]].mean(axis=1).T), dtype=bool)
         if not chosen.any():
             raise SolveError("a traction acts on no facet of the boundary: choose a region that touches it")
-        shape, _ = basis_table(ElementTriP2(), get_quadrature(RefTri, order)[0])
-        positions, weights, functions = x[corners[chosen]], facets.weights[chosen], facets.values
-        table = facets.nodes[chosen]
-    where = np.einsum("qn,kni->kqi", shape, positions).reshape(-1, 3).T
-    return LoadedPoints(load.value, where, weights, functions, table, count)
+        table, weights, functions = facets.nodes[chosen], facets.weights[chosen], facets.values
+    where = np.einsum("qn,kni->kqi", functions, x[table]).reshape(-1, 3).T
+    return LoadedPoints(load.value, where, weights, functions, table, len(x))
 
 
 def nodal_force(points: LoadedPoints, t: float):

@@ -6,8 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from skfem import MeshTet
 
-from reference_fem.elements.shapes import build_facets, displacement_points
-from reference_fem.elements.table import DEFAULT, find_element
+from reference_fem.elements.shapes import ORDER, facet_nodes, nodes
 from reference_fem.errors import SolveError
 from reference_fem.model.cavity import Cavity
 from reference_fem.model.loads import BodyForce, PointMass, Traction
@@ -35,9 +34,8 @@ class Problem:
     """A quasi-static problem in SI units; the body is stress-free on its mesh.
 
     mesh: MeshTet (straight) or MeshTet2 (curved, see curve). gravity [m/s²], density [kg/m³].
-    cavities: lumens that keep a volume or a pressure; a lumen not named is open. element: a name in ELEMENTS.
-    order: degree integrated exactly, None = default of the element (for P2/P1 it is 5, the lowest with positive weights
-    and at least 4, which p J needs). loads: dead forces, applied with gravity at the start, then functions of time.
+    cavities: lumens that keep a volume or a pressure; a lumen not named is open. order: degree integrated exactly, at
+    least 4. loads: dead forces, applied with gravity at the start, then functions of time.
     masses: point masses at nodes. faces_touch: boundary facets that coincide at rest, those of a cut, may not overlap;
     they slide without friction, by less than a facet.
     """
@@ -48,18 +46,12 @@ class Problem:
     obstacles: Sequence[Obstacle] = ()
     gravity: Sequence[float] = (0.0, 0.0, 0.0)
     density: float = 0.0
-    order: int | None = None
+    order: int = ORDER
     contact_order: int = 4
     cavities: Sequence[Cavity] = ()
-    element: str = DEFAULT
     loads: Sequence[Traction | BodyForce] = ()
     masses: Sequence[PointMass] = ()
     faces_touch: bool = False
-
-    @property
-    def degree(self) -> int:
-        """The quadrature order in use."""
-        return find_element(self.element).order if self.order is None else self.order
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,9 +76,7 @@ class HeldNodes:
 
 def find_held(problem: Problem) -> list[HeldNodes]:
     """Held regions as unknowns; raises SolveError if a region contains no node or names a wrong component."""
-    element = find_element(problem.element)
-    x = displacement_points(problem.mesh, element)
-    boundary = np.unique(build_facets(problem.mesh, problem.contact_order, element).nodes)
+    x, boundary = nodes(problem.mesh), np.unique(facet_nodes(problem.mesh))
     regions = []
     for k, held in enumerate(problem.held):
         components = tuple(held.components)

@@ -6,8 +6,7 @@ from typing import Literal
 
 import numpy as np
 
-from reference_fem.elements.shapes import displacement_points
-from reference_fem.elements.table import find_element
+from reference_fem.elements.shapes import nodes
 from reference_fem.model.problem import Problem
 
 
@@ -83,5 +82,4 @@ class Oracle:
 
 def unknowns(problem: Problem) -> int:
     """Number of unknowns of a problem, including held ones."""
-    element, mesh = find_element(problem.element), problem.mesh
-    return 3 * len(displacement_points(mesh, element)) + (mesh.nvertices if element.pressure else 0)
+    return 3 * len(nodes(problem.mesh)) + problem.mesh.nvertices

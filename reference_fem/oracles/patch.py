@@ -3,7 +3,6 @@
 import numpy as np
 
 from reference_fem.elements.shapes import nodes
-from reference_fem.elements.table import ELEMENTS
 from reference_fem.model.material import MooneyRivlin
 from reference_fem.model.problem import PrescribedDisplacement, Problem
 from reference_fem.oracles.base import Check, Oracle, Outcome, unknowns
@@ -23,22 +22,19 @@ def affine():
 
 
 def measure() -> Outcome:
-    """Largest error of displacement and pressure, for every element and from kappa/mu = 10 to 1e5."""
+    """Largest error of displacement and pressure, from kappa/mu = 10 to 1e5."""
     mesh, checks = block(skew=0.1), []
     x, F = nodes(mesh), affine()
-    for name in ELEMENTS:
-        for ratio in RATIOS:
-            material = MooneyRivlin(0.3, 0.2, ratio)
-            shape = lambda x: (F - np.eye(3)) @ x  # noqa: E731
-            held = [PrescribedDisplacement(lambda x: np.ones(x.shape[1], bool), (0, 1, 2), lambda t: (t, t, t), shape)]
-            problem = Problem(mesh, material, held, element=name)
-            state = equilibrium_path(problem, [1.0], TIGHT)[0]
-            misfit = float(np.abs(state.u - x @ (F - np.eye(3)).T).max())
-            size, at = unknowns(problem), f"{name}, kappa/mu {ratio:g}"
-            about = f"block, {mesh.nelements} {name}"
-            checks.append(Check(f"worst u error, {at}", "m", 0.0, misfit, 1e-8, about, size, absolute=True))
-            worst = state.p[np.argmax(np.abs(state.p - ratio * STRAIN))]
-            checks.append(Check(f"worst pressure, {at}", "mu", ratio * STRAIN, float(worst), 1e-8, about, size))
+    shape = lambda x: (F - np.eye(3)) @ x  # noqa: E731
+    held = [PrescribedDisplacement(lambda x: np.ones(x.shape[1], bool), (0, 1, 2), lambda t: (t, t, t), shape)]
+    for ratio in RATIOS:
+        problem = Problem(mesh, MooneyRivlin(0.3, 0.2, ratio), held)
+        state = equilibrium_path(problem, [1.0], TIGHT)[0]
+        misfit = float(np.abs(state.u - x @ (F - np.eye(3)).T).max())
+        about = (f"block, {mesh.nelements} P2/P1", unknowns(problem))
+        checks.append(Check(f"worst u error, kappa/mu {ratio:g}", "m", 0.0, misfit, 1e-8, *about, absolute=True))
+        worst = float(state.p[np.argmax(np.abs(state.p - ratio * STRAIN))])
+        checks.append(Check(f"worst pressure, kappa/mu {ratio:g}", "mu", ratio * STRAIN, worst, 1e-8, *about))
     return Outcome(tuple(checks))
 
 

@@ -16,10 +16,10 @@ TIGHT = NewtonSettings(force_tol=1e-11, volume_tol=1e-12)
 """Newton converges quadratically: after one more iteration only round-off is left."""
 
 
-def pull(material: Material, stretch: float, mesh: MeshTet, element: str = "P2/P1"):
+def pull(material: Material, stretch: float, mesh: MeshTet):
     """(problem, equilibrium) of the block at one stretch; the pulled end is the last held region."""
     end = PrescribedDisplacement(lambda x: x[2] > 1 - 1e-9, (2,), lambda t: (0.0, 0.0, (stretch - 1.0) * t))
-    problem = Problem(mesh, material, [*symmetry(), end], element=element)
+    problem = Problem(mesh, material, [*symmetry(), end])
     return problem, equilibrium_path(problem, [0.5, 1.0], TIGHT)[-1]
 
 

@@ -8,7 +8,6 @@ from numpy.typing import ArrayLike
 
 from reference_fem.contact import augmented as contact
 from reference_fem.contact.faces import farthest_slip, overlap
-from reference_fem.elements.shapes import at_nodes, forces_at_nodes
 from reference_fem.errors import SolveError
 from reference_fem.model.problem import Problem
 from reference_fem.statics.newton import StepFailed, solve_step
@@ -151,19 +150,18 @@ def describe(system: System, state: State, iterations: int, substeps: int) -> Eq
             f"faces of the cut that touch have slid over each other by {slip:.2g} facets at t = {state.t:g} s, and"
             " points find each other within one: press them with less shear, or take a coarser mesh"
         )
-    mesh, material = system.problem.mesh, system.problem.material
-    J = np.linalg.det(assembly.deformation(state.x, elements, material.kappa)[0])
+    J = np.linalg.det(assembly.deformation(state.x, elements)[0])
     reaction, held = np.zeros(n), system.pattern.held
     reaction[held] = evaluation.residual[held]
     for lumen, pressure in zip(system.lumens, state.x[system.field_count :], strict=True):
         reaction[held] += pressure * lumen.beyond_pressure(state.x[: system.field_count])[held]
     return Equilibrium(
         t=float(state.t),
-        u=at_nodes(mesh, system.element, state.x[:n].reshape(-1, 3).copy()),
-        p=assembly.vertex_pressure(state.x[: system.field_count], elements, mesh, material.kappa),
+        u=state.x[:n].reshape(-1, 3).copy(),
+        p=state.x[n : system.field_count].copy(),
         obstacle_force=evaluation.touch.force,
         held_force=held_forces(system, reaction),
-        reaction=forces_at_nodes(mesh, system.element, reaction.reshape(-1, 3)),
+        reaction=reaction.reshape(-1, 3),
         volume=float(np.sum(elements.weights * J)),
         volume0=system.volume,
         J=J,
@@ -172,7 +170,7 @@ def describe(system: System, state: State, iterations: int, substeps: int) -> Eq
         slippage=contact.slippage(evaluation.touch),
         newton_iterations=iterations,
         substeps=substeps,
-        energy=assembly.energy(state.x, elements, material),
+        energy=assembly.energy(state.x, elements, system.problem.material),
         cavity_pressure=state.x[system.field_count :].copy(),
         cavity_volume=evaluation.volumes,
     )

@@ -166,7 +166,7 @@ def repaired(system: System, x: np.ndarray) -> np.ndarray:
     free[system.pattern.held[system.pattern.held < n]] = False
     free = free.reshape(-1, 3)
     for attempt in range(REPAIRS):
-        J = np.linalg.det(assembly.deformation(x[: system.field_count], system.elements, 1.0)[0])
+        J = np.linalg.det(assembly.deformation(x[: system.field_count], system.elements)[0])
         bad = np.flatnonzero(J.min(axis=1) <= 0.0)
         if not len(bad):
             break

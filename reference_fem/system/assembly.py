@@ -1,11 +1,10 @@
 """Residual and tangent of all elements, added into a prebuilt pattern."""
 
 import numpy as np
-from skfem import MeshTet
 
 from reference_fem.compiled import compiled
 from reference_fem.elements.shapes import Elements
-from reference_fem.model.material import Material, cofactor_into, response_into
+from reference_fem.model.material import Material, response_into
 
 CONTRACT = {"contract"}
 """Fused multiply-add only: no reordering, so two runs agree bitwise."""
@@ -23,19 +22,16 @@ def add_elements(
 ):
     """residual += dPi/dx, values += d²Pi/dx² (if tangent); returns the smallest J, and stops at J <= 0.
 
-    x: u at the displacement functions [m], interleaved, then p [Pa], (total,). positions: slots of the packed upper
+    x: u at the nodes [m], interleaved, then p [Pa], (total,). positions: slots of the packed upper
     triangles. Pi = sum w W(F, p). r_u = w P·grad N, r_p = w (J - 1 - p/kappa) M.
     """
     dofs, gradients, pressures, weights, sizes = elements
-    unknown_count, whole = len(sizes.unknowns), 3 * len(sizes.functions) + len(sizes.pressures)
-    ue, re = np.zeros(whole), np.empty(whole)
-    K = np.empty((whole, whole))
+    count = 3 * len(sizes.functions) + len(sizes.pressures)
+    ue, re, K = np.empty(count), np.empty(count), np.empty((count, count))
     smallest = np.inf
     for e in range(dofs.shape[0]):
-        for a in range(unknown_count):
+        for a in range(count):
             ue[a] = x[dofs[e, a]]
-        if unknown_count < whole:
-            ue[unknown_count] = mean_pressure(ue, gradients[e], weights[e], sizes.functions, parameters)
         re[:] = 0.0
         K[:] = 0.0
         J = integrate_element(
@@ -44,14 +40,12 @@ def add_elements(
         smallest = min(smallest, J)
         if not J > 0.0:
             return J
-        for a in range(unknown_count):
+        for a in range(count):
             residual[dofs[e, a]] += re[a]
         if tangent:
-            if unknown_count < whole:
-                condense(K, unknown_count)
             slot = 0
-            for a in range(unknown_count):
-                for b in range(a, unknown_count):
+            for a in range(count):
+                for b in range(a, count):
                     values[positions[e, slot]] += K[a, b]
                     slot += 1
     return smallest
@@ -67,26 +61,6 @@ def deformation_into(ue: np.ndarray, G: np.ndarray, functions: tuple, F: np.ndar
             for a in range(count):
                 s += ue[count * i + a] * G[r, a]
             F[i, r] = s
-
-
-@compiled()
-def mean_pressure(ue: np.ndarray, gradients: np.ndarray, weights: np.ndarray, functions: tuple, parameters: np.ndarray):
-    """kappa (sum w J / sum w - 1): the pressure [Pa] that solves the volume equation of a single element (eq. 6.14)."""
-    F, cof, change, volume = np.empty((3, 3)), np.empty((3, 3)), 0.0, 0.0
-    for q in range(weights.shape[0]):
-        deformation_into(ue, gradients[q], functions, F)
-        change += weights[q] * (cofactor_into(F, cof) - 1.0)
-        volume += weights[q]
-    return parameters[2] * change / volume
-
-
-@compiled()
-def condense(K: np.ndarray, n: int):
-    """K[:n, :n] -= K[:n, n] K[:n, n]ᵀ / K[n, n], upper triangle: the last unknown eliminated."""
-    for a in range(n):
-        share = K[a, n] / K[n, n]
-        for b in range(a, n):
-            K[a, b] -= share * K[b, n]
 
 
 @compiled(fastmath=CONTRACT)
@@ -166,32 +140,15 @@ def add_pressure_blocks(
             K[3 * count + q, 3 * count + r] -= w_kappa * M[q] * M[r]
 
 
-def deformation(x: np.ndarray, elements: Elements, kappa: float):
-    """F (ne, nq, 3, 3) and p (ne, nq) [Pa] at the quadrature points, in plain NumPy; kappa: bulk modulus of the
-    material [Pa]."""
-    unknown_count, count = elements.dofs.shape[1], 3 * len(elements.sizes.functions)
-    local = x[elements.dofs]
+def deformation(x: np.ndarray, elements: Elements):
+    """F (ne, nq, 3, 3) and p (ne, nq) [Pa] at the quadrature points, in plain NumPy."""
+    local, count = x[elements.dofs], 3 * len(elements.sizes.functions)
     u = local[:, :count].reshape(len(local), 3, -1)
     F = np.eye(3) + np.einsum("eia,eqra->eqir", u, elements.gradients)
-    if unknown_count > count:
-        return F, local[:, count:] @ elements.pressures.T
-    change = np.linalg.det(F) - 1.0
-    mean = np.sum(elements.weights * change, axis=1) / elements.weights.sum(axis=1)
-    return F, np.broadcast_to(kappa * mean[:, None], change.shape)
+    return F, local[:, count:] @ elements.pressures.T
 
 
 def energy(x: np.ndarray, elements: Elements, material: Material):
     """Potential Pi(x) = sum w W(F, p) [J]; independent of the kernel, to check it."""
-    F, p = deformation(x, elements, material.kappa)
+    F, p = deformation(x, elements)
     return float(np.sum(elements.weights * material.energy_density(F, p)))
-
-
-def vertex_pressure(x: np.ndarray, elements: Elements, mesh: MeshTet, kappa: float):
-    """Pressure at the vertices [Pa], (N1,): the unknowns themselves, or the mean of the elements around each."""
-    unknown_count, count = elements.dofs.shape[1], 3 * len(elements.sizes.functions)
-    if unknown_count > count:
-        return x[len(x) - mesh.nvertices :].copy()
-    _, p = deformation(x, elements, kappa)
-    volume, corners = elements.weights.sum(axis=1), mesh.t[:4].T
-    total = np.bincount(corners.ravel(), np.repeat(volume * p[:, 0], 4), minlength=mesh.nvertices)
-    return total / np.bincount(corners.ravel(), np.repeat(volume, 4), minlength=mesh.nvertices)

@@ -49,7 +49,7 @@ def check_loads(problem: Problem):
             )
     for name in ("order", "contact_order"):
         given = getattr(problem, name)
-        if given is not None and given < 4:
+        if given < 4:
             raise SolveError(f"the quadrature {name} is {given}: 4 is the least that integrates p J exactly")
 
 

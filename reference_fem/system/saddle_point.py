@@ -6,9 +6,8 @@ import numpy as np
 
 from reference_fem.contact import augmented as contact
 from reference_fem.contact.faces import Faces, FaceTouch, add_faces, coincident, no_faces
-from reference_fem.elements.shapes import Facets, build_elements, build_facets, displacement_points, facet_slopes
+from reference_fem.elements.shapes import Facets, build_elements, build_facets, nodes
 from reference_fem.elements.surface import Surface
-from reference_fem.elements.table import find_element
 from reference_fem.errors import SolveError
 from reference_fem.model import cavity, obstacles
 from reference_fem.model.loads import BodyForce, find_points, nodal_force
@@ -52,26 +51,25 @@ class System:
         mesh, self.problem, self.settings = problem.mesh, problem, settings
         checks.check_mesh(mesh)
         checks.check_loads(problem)
-        self.element = find_element(problem.element)
-        self.nodes = displacement_points(mesh, self.element)
+        self.nodes = nodes(mesh)
         self.displacement_count = 3 * len(self.nodes)
-        self.field_count = self.displacement_count + (mesh.nvertices if self.element.pressure else 0)
+        self.field_count = self.displacement_count + mesh.nvertices
         self.total = self.field_count + len(problem.cavities)
-        self.elements = build_elements(mesh, problem.degree, self.element)
+        self.elements = build_elements(mesh, problem.order)
         self.volume = float(self.elements.weights.sum())
         self.held = find_held(problem)
         mask = np.zeros(self.field_count, dtype=bool)
         for held in self.held:
             mask[held.dofs] = True
         self.check_freedom(np.flatnonzero(mask))
-        facets = build_facets(mesh, problem.contact_order, self.element)
+        facets = build_facets(mesh, problem.contact_order)
         pairs = coincident(facets, self.nodes) if problem.faces_touch else np.zeros((0, 2, facets.nodes.shape[1]), int)
         apart = (3 * pairs[:, :, None] + np.arange(3)[:, None]).reshape(len(pairs), 6 * pairs.shape[2])
         self.pattern = build_pattern(self.elements.dofs, mask, *([apart] if len(apart) else []))
         self.positions = self.pattern.positions(self.elements.dofs)
         self.surface = self.build_surface(facets)
         self.faces = self.build_faces(facets, pairs[:, 0], apart)
-        self.lumens = cavity.find_lumens(problem, self.pattern, self.element.facet, facets.nodes, self.held)
+        self.lumens = cavity.find_lumens(problem, self.pattern, facets.nodes, self.held)
         self.rows = np.array([obstacle.row() for obstacle in problem.obstacles]).reshape(-1, 8)
         self.sticks = obstacles.sticky(problem.obstacles)
         self.loaded = self.find_loads()
@@ -97,9 +95,8 @@ class System:
             return no_faces(*facets.values.shape)
         place = {tuple(row): k for k, row in enumerate(facets.nodes)}
         at = np.array([place[tuple(row)] for row in behind])
-        slopes = facet_slopes(self.problem.contact_order, self.element)
         tables = dofs.astype(np.uint32), self.pattern.positions(dofs)
-        shapes = facets.values, slopes, facets.weights[at], self.surface.penalty[at]
+        shapes = facets.values, facets.slopes, facets.weights[at], self.surface.penalty[at]
         return Faces(*tables, self.nodes.ravel(), *shapes)
 
     def find_loads(self):
@@ -107,7 +104,7 @@ class System:
         loads, pull = list(self.problem.loads), self.problem.density * np.asarray(self.problem.gravity, dtype=float)
         if pull.any():
             loads.append(BodyForce(lambda t, x: np.repeat(pull[:, None], x.shape[1], axis=1)))
-        return [find_points(load, self.problem.mesh, self.element, self.problem.degree) for load in loads]
+        return [find_points(load, self.problem.mesh, self.problem.order) for load in loads]
 
     def force_at(self, t: float, share: float = 1.0):
         """Share of all dead forces at time t, (field_count,) [N]."""

@@ -34,9 +34,8 @@ class NewtonSettings:
 class State:
     """Unknowns x and contact multipliers at time t; `iterations`: those of the step that led here.
 
-    x: u at the displacement functions (P2: the nodes) [m], interleaved, p at the vertices [Pa] unless the element
-    eliminates it, pressures of the cavities [Pa]. load: share of the dead forces and of the start values of cavities
-    that acts; 1 once they are fully applied.
+    x: u at the nodes [m], interleaved, p at the vertices [Pa], pressures of the cavities [Pa]. load: share of the dead
+    forces and of the start values of cavities that acts; 1 once they are fully applied.
     """
 
     t: float

@@ -133,7 +133,7 @@ def faults(problem, newton, state):
     )
     off = np.linalg.norm(state.obstacle_force.sum(axis=0) + state.held_force.sum(axis=0) + weight)
     noise = 1e-11 * (mu + np.abs(state.p).max()) * volume ** (2 / 3) * len(state.u)
-    at, _ = get_quadrature(RefTet, problem.degree)
+    at, _ = get_quadrature(RefTet, problem.order)
     share = np.vstack((1.0 - at.sum(axis=0), at)).T
     mean = np.sum(state.weights * (state.p[problem.mesh.t[:4].T] @ share.T)) / volume
     depth = newton.penetration_tol * np.abs(state.u).max() + ROUND_OFF * np.ptp(nodes(problem.mesh))

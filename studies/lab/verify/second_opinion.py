@@ -58,7 +58,7 @@ def oracle(name: str, title: str, build: Callable[[], Problem]) -> Oracle:
 def opinion(problem: Problem, what: str) -> tuple[Check, ...]:
     """Force of the first held region, displacement and pressure of both codes at the end of STEPS."""
     ours, theirs = equilibrium_path(problem, STEPS, CLOSE)[-1], solve(problem, STEPS)
-    place = f"{what}, {problem.mesh.nelements:,} straight elements, order {problem.degree} in both"
+    place = f"{what}, {problem.mesh.nelements:,} straight elements, order {problem.order} in both"
     count = unknowns(problem)
     force, our_force = (float(np.linalg.norm(solution.held_force[0])) for solution in (theirs, ours))
     size, our_size = (float(np.sqrt(np.mean(solution.u**2))) for solution in (theirs, ours))

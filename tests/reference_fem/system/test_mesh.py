@@ -1,4 +1,4 @@
-"""Meshes, boundary facets, the sparsity pattern, and the evaluator."""
+"""Meshes, boundary facets, and the evaluator."""
 
 import numpy as np
 import pytest
@@ -6,7 +6,6 @@ from skfem import ElementTetP2
 
 from reference_fem import Evaluator, SolveError, nodes, surface_triangles
 from reference_fem.elements.shapes import basis_table, build_elements, build_facets, element_nodes, facet_nodes
-from reference_fem.system.pattern import build_pattern
 from tests.reference_fem.bodies import ball_octant, block, shell_octant
 
 
@@ -40,23 +39,6 @@ def test_mid_side_nodes_of_facets_are_in_the_middle():
     x, table = nodes(mesh), facet_nodes(mesh)
     for k, (i, j) in enumerate(((0, 1), (1, 2), (0, 2))):
         np.testing.assert_allclose(x[table[:, 3 + k]], 0.5 * (x[table[:, i]] + x[table[:, j]]), atol=1e-15)
-
-
-def test_pattern_adds_up_to_the_dense_matrix():
-    """Random symmetric element matrices through the pattern, against plain dense assembly."""
-    rng = np.random.default_rng(0)
-    dofs = np.array([[0, 3, 2, 5], [4, 2, 1, 3], [5, 6, 0, 1]])
-    held = np.array([False, False, True, False, False, False, True])
-    pattern, dense = build_pattern(dofs, held), np.zeros((7, 7))
-    values, rows, columns = np.zeros(pattern.size), *np.triu_indices(4)
-    for element, slots in zip(dofs, pattern.positions(dofs), strict=True):
-        K = rng.standard_normal((4, 4))
-        K += K.T
-        dense[np.ix_(element, element)] += K
-        np.add.at(values, slots, K[rows, columns])
-    free = np.flatnonzero(~held)
-    np.testing.assert_allclose(pattern.upper(values).toarray(), np.triu(dense[np.ix_(free, free)]), atol=1e-14)
-    np.testing.assert_allclose(pattern.lifting(values).toarray(), dense[np.ix_(free, [2, 6])], atol=1e-14)
 
 
 def quadratic(x):

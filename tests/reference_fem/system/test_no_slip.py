@@ -19,7 +19,7 @@ from reference_fem.elements.surface import point_positions
 from reference_fem.model.obstacles import gap_into, gaps
 from reference_fem.system.saddle_point import System
 from reference_fem.system.state import Loads
-from tests.reference_fem.bodies import ball_octant, block, symmetry
+from tests.reference_fem.bodies import ball_octant, block, contact_potential, symmetry
 
 TISSUE = NeoHookean(1.0, 1000.0)
 BOTTOM = PrescribedDisplacement(lambda x: x[2] < 1e-9)
@@ -96,7 +96,7 @@ def test_force_of_stuck_points_is_the_gradient_of_the_potential(gripped):
 
     def potential(y):
         touch = contact.touch(loads.rows, np.zeros((3, 3)), loads.multiplier, system.surface.penalty, loads.grip)
-        return contact.potential(y, system.surface, touch)
+        return contact_potential(y, system.surface, touch)
 
     bare = loads._replace(rows=loads.rows[:0], multiplier=loads.multiplier[:0], grip=contact.NO_GRIP)
     force = system.evaluate(x, loads).residual - system.evaluate(x, bare).residual
