@@ -90,7 +90,7 @@ def cross_into(a: np.ndarray, b: np.ndarray, c: np.ndarray):
 def slopes_into(
     faces: Faces, q: int, apart: np.ndarray, a1: np.ndarray, a2: np.ndarray, B: np.ndarray, n: np.ndarray, d: np.ndarray
 ):
-    """g [m], |A| and dg/dx in `d` (36,) (eq. 6.16); n (3,) the normal, B (3, 18) = dA/d(half-way nodes)."""
+    """g [m], |A| and dg/dx in `d` (36,) (eq. 6.15); n (3,) the normal, B (3, 18) = dA/d(half-way nodes)."""
     count, area, v1, v2 = faces.values.shape[1], np.empty(3), np.empty(3), np.empty(3)
     cross_into(a1, a2, area)
     size = np.sqrt(area[0] ** 2 + area[1] ** 2 + area[2] ** 2)
@@ -127,7 +127,7 @@ def add_curvature(
     f: float,
     K: np.ndarray,
 ):
-    """K += f d²g/dx² (36, 36) (eq. 6.17)."""
+    """K += f d²g/dx² (36, 36) (eq. 6.16)."""
     count = faces.values.shape[1]
     half, shear, along, slip = np.empty(3 * count), np.empty((3 * count, 3 * count)), np.empty(3 * count), np.empty(3)
     for k in range(3):

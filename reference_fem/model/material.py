@@ -81,7 +81,7 @@ class NeoHookean(TwoTermLaw):
 class MooneyRivlin(TwoTermLaw):
     """W = c1 (J^-2/3 I1 - 3) + c2 (J^-4/3 I2 - 3) + p (J - 1) - p²/(2 kappa), shear modulus 2 (c1 + c2); all in Pa.
 
-    Two-term law of Mooney (1940) and Rivlin (1948), made isochoric (docs/theory.md, eq. 6.15). Raises SolveError
+    Two-term law of Mooney (1940) and Rivlin (1948), made isochoric (docs/theory.md, eq. 6.14). Raises SolveError
     when kappa or the shear modulus is not positive and finite, or c1 or c2 is negative: then the energy is not
     polyconvex.
     """

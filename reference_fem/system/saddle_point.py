@@ -177,7 +177,7 @@ class System:
             if len(self.faces.dofs):
                 add_faces(x, self.faces, between, values, residual, tangent)
             for k, (lumen, filling) in enumerate(zip(self.lumens, loads.filling, strict=True)):
-                pressure = x[self.field_count + k]
+                pressure = float(x[self.field_count + k])
                 volumes[k] = lumen.add(x, pressure, gradients[k], values, tangent)
                 residual[: self.field_count] -= pressure * gradients[k]
                 residual[self.field_count + k] = (pressure if lumen.by_pressure else volumes[k]) - filling
