@@ -49,9 +49,18 @@ def main() -> None:
     warnings.showwarning = lambda message, *_: complain(f"warning: {message}")  # type: ignore[assignment]
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="replace")  # a terminal that has no "±" shows "?"
+    code: str | int | None = 0
     try:
-        code = _exit_code()
-    except KeyboardInterrupt:  # between two lines of it
+        app()
+    except SystemExit as stop:  # typer ends with it always, and turns KeyboardInterrupt into interrupts.CODE
+        code = stop.code
+    except KeyboardInterrupt:  # between two lines of typer
+        code = interrupts.exit_code()
+    except Exception as error:
+        if not interrupts.pressed():
+            complain(f"organbench: {message(error)}")
+            code = 2
+    if interrupts.pressed():  # whatever came of the command: a library may have made something else of it
         code = interrupts.exit_code()
     if code in (interrupts.CODE, interrupts.exit_code()):
         interrupts.close_ears()
@@ -60,22 +69,9 @@ def main() -> None:
     sys.exit(flushed(code))
 
 
-def _exit_code() -> str | int | None:
-    """Runs the command. Whatever came of it, once a signal came it counts as interrupted."""
-    code: str | int | None = 0
-    try:
-        app()
-    except SystemExit as stop:  # typer ends with it always, and turns KeyboardInterrupt into interrupts.CODE
-        code = stop.code
-    except Exception as error:
-        if not interrupts.pressed():
-            complain(f"organbench: {message(error)}")
-            code = 2
-    return interrupts.exit_code() if interrupts.pressed() else code
-
-
 def message(error: Exception) -> str:
-    """The sentence for an error."""
+    """The sentence for an error. The traceback of one that nobody foresaw goes to a file; it is raised again where
+    TRACEBACK is set."""
     if isinstance(error, (StudyError, MassSpringError, SolveError)):
         return str(error)
     fault = fault_of(error)
@@ -84,11 +80,6 @@ def message(error: Exception) -> str:
     # An error with a file name is not one of the terminal's.
     if isinstance(error, OSError) and error.filename is None and error.errno in (errno.ENOSPC, errno.EIO, errno.EBADF):
         return unwritten(error)
-    return unforeseen(error)
-
-
-def unforeseen(error: Exception) -> str:
-    """The sentence for a fault of this program, whose traceback goes to a file; raises it again if TRACEBACK is set."""
     if os.environ.get(TRACEBACK):
         raise error
     first = str(error).strip().split("\n")[0]

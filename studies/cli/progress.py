@@ -100,20 +100,9 @@ class TerminalProgress:
 
 @contextmanager
 def compiling(console: Console, doing: str) -> Iterator[Callable[[str], None]]:
-    """Inside, what is given names is shown as being compiled: on a terminal in a line that moves, next to what is being
-    done; in a log once, and then at most every QUIET_SECONDS."""
-    last_report = -QUIET_SECONDS
+    """Inside, what is given names is shown as being compiled, next to what is being done; in a log nothing is."""
     with console.status(f"{doing} …") if console.is_terminal else nullcontext() as status:
-
-        def tell(name: str) -> None:
-            nonlocal last_report
-            if status is not None:
-                status.update(f"{doing}: compiling {name} (kept for the next time) …")
-            elif time.monotonic() - last_report > QUIET_SECONDS:
-                last_report = time.monotonic()
-                console.print(f"compiling {name} (kept for the next time)", markup=False, highlight=False)
-
-        yield tell
+        yield lambda name: status and status.update(f"{doing}: compiling {name} (kept for the next time) …")
 
 
 def dry_run(console: Console, study: str, planned: list[Planned], jobs: int) -> None:

@@ -11,7 +11,7 @@ from rich.console import Console
 
 from studies.base.compile_watch import watching
 from studies.base.processes import run_each
-from studies.cli.progress import QUIET_SECONDS, TerminalProgress, compiling, words
+from studies.cli.progress import QUIET_SECONDS, TerminalProgress, words
 from studies.metrics.timing.cases import timing_file
 from studies.runs.current import case_path
 from studies.store.entry import CODE_CHANGED, MISSING
@@ -119,10 +119,7 @@ def test_a_log_has_one_line_on_compiling_and_then_rests():
     with TerminalProgress(console) as progress:
         for name in ("free_frame", "free_frame", "other"):
             progress.compiling(name)
-    with compiling(console, "measuring") as show:
-        show("free_frame")
-        show("other")
-    assert lines(console) == ["compiling free_frame (kept for the next time)"] * 2
+    assert lines(console) == ["compiling free_frame (kept for the next time)"]
     assert QUIET_SECONDS > 1
 
 

@@ -34,9 +34,14 @@ def compare(
         say(line)
     rows = rows_of(comparison.moved[:SHOWN], comparison)
     if rows and console.is_terminal:
-        console.print(drawn(rows))
+        table = Table(box=None, pad_edge=False, padding=(0, 1, 0, 0))
+        for number, heading in enumerate(HEADS):
+            table.add_column(heading, justify="left" if number < HEADS.index("old") else "right", overflow="fold")
+        for row in rows:
+            table.add_row(*row)
+        console.print(table)
     elif rows:
-        say("\n".join(markdown(rows)))
+        say("\n".join(["", *(f"| {' | '.join(row)} |" for row in (HEADS, ["---"] * len(HEADS), *rows))]))
     left = len(comparison.moved) - len(rows)
     if left:
         say(f"{left} more have moved; --csv FILE has them all")
@@ -86,18 +91,3 @@ def _numbers(change: Change) -> list[str]:
         return [change.metric, str(change.old), str(change.new), MISSING, MISSING]
     numbers = [plain(change.old), plain(change.new), plain(change.new - change.old, "+"), plain(change.floor)]
     return [f"{change.metric} [{change.unit}]", *numbers]
-
-
-def markdown(rows: Sequence[Sequence[str]]) -> list[str]:
-    """The rows as a table in Markdown."""
-    return ["", *(f"| {' | '.join(row)} |" for row in (HEADS, ["---"] * len(HEADS), *rows))]
-
-
-def drawn(rows: Sequence[Sequence[str]]) -> Table:
-    """The rows as a table that keeps to the width of the terminal."""
-    table = Table(box=None, pad_edge=False, padding=(0, 1, 0, 0))
-    for number, heading in enumerate(HEADS):
-        table.add_column(heading, justify="left" if number < HEADS.index("old") else "right", overflow="fold")
-    for row in rows:
-        table.add_row(*row)
-    return table

@@ -68,7 +68,6 @@ def time_frames(job: CaseJob) -> None:
 
 
 def line(run: Run, words: str) -> str:
-    """Volume, force and speed of a run."""
     reference = run.reference
     if reference is None:
         raise StudyError(f"the scene '{run.case.scene.name}' has no reference: `organbench show demo` says why")

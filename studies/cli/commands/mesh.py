@@ -2,10 +2,10 @@
 
 import json
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 import typer
@@ -34,16 +34,18 @@ from studies.geometry.files.units import NAMES, Source, check_unit
 from studies.geometry.files.writing import SURFACES, VOLUMES, check_target, holds_tetrahedra, write_mesh
 from studies.geometry.mesh.quality import dihedral_angles
 from studies.geometry.organs import SHAPES
-from studies.geometry.shape.levelset import Shape
 from studies.meshing.bounds import SHAPE, SHAPE_VOLUME
+from studies.meshing.curved_mesh import boundary_facets, curved_mesh
+from studies.meshing.rest_surface import RestSurface, rest_surfaces
+from studies.meshing.true_surface import ShapeErrors, shape_errors
 from studies.scene.scene import Organ
 from studies.scene.scene_file import organ_options
 
-if TYPE_CHECKING:
-    from studies.meshing.rest_surface import RestSurface
-    from studies.meshing.true_surface import ShapeErrors
-
 NODES = 550
+TRIES = 4
+"""Numbers of nodes that are tried."""
+LEAST, SAFETY, MOST = 1.2, 1.1, 3.0
+"""Steps between them: the distance of flat sides falls as the area of a facet does, of curved ones faster."""
 
 
 def mesh(
@@ -81,14 +83,20 @@ def mesh(
     check_unit(write_unit)
     check_target(output, source)
     filled = check_filling(output, fill, order)
-    check_one(name, source, seed)
+    if bool(name) == (source is not None):
+        raise StudyError("name what to mesh: an organ (see `organbench list`), or --from FILE")
+    if source is not None and seed is not None:
+        raise StudyError("--seed varies synthetic organs; leave it out for a file")
     if source is None:
         given = {"--smooth": smooth, "--close-holes": close_holes, "--solid": solid, "--unit": unit}
-        refuse_file_options(given | {"--scale": scale != 1.0, "--longest-side": longest_side, "--part": part})
+        given |= {"--scale": scale != 1.0, "--longest-side": longest_side, "--part": part}
+        wrong = [option for option, value in given.items() if value not in (None, False)]
+        if wrong:
+            raise StudyError(f"{' and '.join(wrong)} are for files (--from); leave them out for a synthetic organ")
 
         def make(count: int | None) -> Made:
             mesh = synthetic(name, NODES if count is None else count, seed, wall, filled, exact=order == 1)
-            return Made(mesh, following(mesh, None) if order == 2 else None)
+            return Made(mesh, curved_mesh(mesh, None) if order == 2 else None)
     else:
         file = settled(source_of(source, unit, scale, longest_side, part), yes)
         how = {"smooth": smooth * MM, "solid": in_metres(solid), "wall": in_metres(wall), "holes": close_holes}
@@ -96,7 +104,7 @@ def mesh(
         def make(count: int | None) -> Made:
             mesh = scan(file, count, fill=filled, on_shape=order == 2, **how)
             shape = true_shape_of(file, **how) if count is not None and order == 2 else None
-            return Made(mesh, following(mesh, shape) if order == 2 else None)
+            return Made(mesh, curved_mesh(mesh, shape) if order == 2 else None)
 
     with working(f"meshing {name or (source and source.name)}"):
         made = make(nodes)
@@ -132,21 +140,17 @@ class Made(NamedTuple):
     mesh: OrganMesh
     curved: CurvedMesh | None
 
+    @property
+    def sides(self) -> dict[str, RestSurface]:
+        """Its outer surface and lumen, as curved as they are."""
+        mesh, curved = self
+        if curved is None:
+            return rest_surfaces(mesh.points, mesh.triangles)
+        return rest_surfaces(curved.points, boundary_facets(mesh, curved.cells))
 
-def following(mesh: OrganMesh, shape: Shape | None) -> CurvedMesh:
-    """The mesh with sides that follow its shape; shape: of a file. Raises StudyError."""
-    # Loaded where it is used: it brings the finite elements.
-    from studies.meshing.curved_mesh import curved_mesh
-
-    return curved_mesh(mesh, shape)
-
-
-def check_one(name: str, source: Path | None, seed: int | None) -> None:
-    """Raise StudyError unless an organ or a file is given, and no file with a seed."""
-    if bool(name) == (source is not None):
-        raise StudyError("name what to mesh: an organ (see `organbench list`), or --from FILE")
-    if source is not None and seed is not None:
-        raise StudyError("--seed varies synthetic organs; leave it out for a file")
+    def errors(self, truth: Organ) -> ShapeErrors:
+        """Of the body against its organ."""
+        return shape_errors(truth, self.sides, filled=len(self.mesh.tetrahedra) > 0)
 
 
 def check_filling(output: Path, fill: bool | None, order: int) -> bool:
@@ -157,13 +161,6 @@ def check_filling(output: Path, fill: bool | None, order: int) -> bool:
     if order == 2 and not filled:
         raise StudyError("curved elements (--order 2) fill a body; leave out --surface and write .vtu, .vtk or .msh")
     return filled
-
-
-def refuse_file_options(given: Mapping[str, object]) -> None:
-    """Raise StudyError for options that only a file can have, by name; None, False and 0 are not given."""
-    wrong = [option for option, value in given.items() if value not in (None, False)]
-    if wrong:
-        raise StudyError(f"{' and '.join(wrong)} are for files (--from); leave them out for a synthetic organ")
 
 
 def synthetic(name: str, nodes: int, seed: int | None, wall: float | None, filled: bool, exact: bool) -> OrganMesh:
@@ -183,7 +180,7 @@ def synthetic(name: str, nodes: int, seed: int | None, wall: float | None, fille
 def closeness(made: Made, truth: Organ, make: Callable[[int | None], Made]) -> str:
     """How far a mesh is from its true surface, and where that is too far, how many nodes are not: `make` meshes that
     number."""
-    errors, count = errors_of(made, truth), made.mesh.outer_count
+    errors, count = made.errors(truth), made.mesh.outer_count
     sentence, bounds = f"shape: {errors}", f"within {SHAPE:g} % and {SHAPE_VOLUME:g} %"
     if not errors.worst > 1.0:
         return sentence
@@ -192,37 +189,12 @@ def closeness(made: Made, truth: Organ, make: Callable[[int | None], Made]) -> s
         for _ in range(TRIES):
             count = 10 * int(np.ceil(0.1 * count * min(max(LEAST, SAFETY * errors.worst), MOST)))
             try:
-                errors = errors_of(make(count), truth)
+                errors = make(count).errors(truth)
             except StudyError:
                 continue  # Not lost: more nodes follow.
             if errors.worst <= 1.0:
                 return f"{sentence}; {count:,} nodes keep it {bounds}"
     return f"{sentence}; {count:,} nodes do not keep it {bounds} either"
-
-
-TRIES = 4
-"""Numbers of nodes that are tried."""
-LEAST, SAFETY, MOST = 1.2, 1.1, 3.0
-"""Steps between them: the distance of flat sides falls as the area of a facet does, of curved ones faster."""
-
-
-def errors_of(made: Made, truth: Organ) -> "ShapeErrors":
-    """Of the body against its organ."""
-    from studies.meshing.true_surface import shape_errors
-
-    return shape_errors(truth, sides_of(made), filled=len(made.mesh.tetrahedra) > 0)
-
-
-def sides_of(made: Made) -> "dict[str, RestSurface]":
-    """Its outer surface and lumen, as curved as they are."""
-    # Loaded where they are used: they bring the finite elements.
-    from studies.meshing.curved_mesh import boundary_facets
-    from studies.meshing.rest_surface import rest_surfaces
-
-    mesh, smooth = made
-    if smooth is None:
-        return rest_surfaces(mesh.points, mesh.triangles)
-    return rest_surfaces(smooth.points, boundary_facets(mesh, smooth.cells))
 
 
 def nearness(made: OrganMesh) -> list[str]:
@@ -247,7 +219,7 @@ def summary(made: Made) -> str:
     body = f", {len(mesh.tetrahedra):,} tetrahedra" if len(mesh.tetrahedra) else ""
     angle = f"{float(np.min(dihedral_angles(mesh.points, mesh.tetrahedra))):.3g}" if body else ""
     flattest = f", flattest angle {angle} degrees" if body else ""
-    inside = mesh.lumen_volume if smooth is None or not mesh.hollow else -sides_of(made)["lumen"].volume
+    inside = mesh.lumen_volume if smooth is None or not mesh.hollow else -made.sides["lumen"].volume
     lumen = f", lumen {1e6 * inside:.4g} mL" if mesh.hollow else ""
     surface = f"{mesh.outer_count:,} outer nodes, {len(mesh.outer_triangles):,} outer triangles"
     tissue = mesh.volume if smooth is None else smooth.volume

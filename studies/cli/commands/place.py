@@ -13,7 +13,7 @@ from studies.catalog.population.folder import placed_scene
 from studies.cli.mesh_files import MM, LongestSide, Part, Scale, Unit, Yes, in_metres, settled, source_of, working
 from studies.cli.terminal import say, warn
 from studies.geometry import BallRegion, scan
-from studies.geometry.files.units import Source, stem_of
+from studies.geometry.files.units import stem_of
 from studies.metrics.cells import value_cell
 from studies.plots.place import draw_placing
 from studies.scene.chosen_place import RADIUS, SIDES, place_of
@@ -50,9 +50,14 @@ def place(
     yes: Yes = False,
 ) -> None:
     """Place hold and probe on a scan and write a study: two bodies, their reference, charts and replays."""
-    check_names(output, picture)
+    if output.suffix != ".py":
+        raise StudyError(f"{output.name}: a scene file is Python; give it a name that ends in .py")
+    if picture is not None and picture.suffix.lower() != ".png":
+        raise StudyError(f"{picture.name}: the picture is a PNG; give it a name that ends in .png")
     held, probed = (None if text is None else place_of(text) for text in (hold, probe))
-    name = tissue_of(tissue, path, part)
+    if tissue is not None:
+        lookup(tissue, TISSUES, "tissue")
+    name = tissue or tissue_named(" ".join([stem_of(path), *([part] if part else [])]))
     source = settled(source_of(path, unit, scale, longest_side, part), yes)
     how: dict[str, Any] = {"smooth": smooth * MM, "holes": close_holes, "solid": in_metres(solid)}
     with working(f"meshing {path.name}"):
@@ -65,45 +70,26 @@ def place(
     say(f"  source: {TISSUES[name].source}")
     for line in lines_of(placing):
         say(line)
-    answer = answer_for(source, placing, name)
-    body = second_body(answer)
+    scene, body, seconds = placed_scene(python_name(stem_of(path)), source, placing, TISSUES[name]), None, MESHING
+    try:
+        answer = advise(scene, results=shipped(), timing=False)
+    except StudyError as error:
+        warn([f"the scene has only one body, because none can be recommended: {error}"])
+    else:
+        body = second_body(answer)
+        if answer.chosen is not None and answer.chosen.cost.known:
+            seconds += answer.chosen.cost.value * scene.duration
+    seconds += SECONDS_PER_UNKNOWN * ReferencePlan().most  # on one core, roughly, and without compiling
     text = scene_text(placing, organ_options(source, how), name, nodes, body, output.parent)
     write_whole(output, text.encode())
     if picture is not None:
         draw_placing(mesh, placing, RADIUS * placing.sides[0], picture)
-    say(f"written to {output}; next: organbench run {output}, which takes about {minutes(answer):.0f} minutes")
+    say(f"written to {output}; next: organbench run {output}, which takes about {seconds / 60.0:.0f} minutes")
 
 
-def check_names(output: Path, picture: Path | None) -> None:
-    """Raise StudyError unless the files that will be written are called what they are."""
-    if output.suffix != ".py":
-        raise StudyError(f"{output.name}: a scene file is Python; give it a name that ends in .py")
-    if picture is not None and picture.suffix.lower() != ".png":
-        raise StudyError(f"{picture.name}: the picture is a PNG; give it a name that ends in .png")
-
-
-def tissue_of(given: str | None, path: Path, part: str | None) -> str:
-    """A name of TISSUES: as given, or as the file or its part is called. Raises StudyError."""
-    if given is not None:
-        lookup(given, TISSUES, "tissue")
-        return given
-    return tissue_named(" ".join([stem_of(path), *([part] if part else [])]))
-
-
-def answer_for(source: Source, placing: Proposal, tissue: str) -> Advice | None:
-    """The answer of `organbench advise` for the scene by the published table; None, with a warning, where there is no
-    such table."""
-    scene = placed_scene(python_name(stem_of(source.path)), source, placing, TISSUES[tissue])
-    try:
-        return advise(scene, results=shipped(), timing=False)
-    except StudyError as error:
-        warn([f"the scene has only one body, because none can be recommended: {error}"])
-        return None
-
-
-def second_body(answer: Advice | None) -> Recommended | None:
+def second_body(answer: Advice) -> Recommended | None:
     """The recommended body, which is printed with its errors."""
-    if answer is None or answer.chosen is None:
+    if answer.chosen is None:
         return None
     case, force, displacement = answer.chosen.case, answer.chosen.force, answer.chosen.displacement
     errors = f"force {value_cell(force.value, force.uncertainty, signed=True)} %, "
@@ -113,14 +99,6 @@ def second_body(answer: Advice | None) -> Recommended | None:
     say(f"bodies: tetrahedral of one volume; {case.body.series}, {case.body.nodes} nodes (recommended{near})")
     say(f"  worst errors of the recommended one in {' and '.join(alike)}: {errors}")
     return Recommended(body_in_python(case.body), case.dt_fraction, alike, errors)
-
-
-def minutes(answer: Advice | None) -> float:
-    """Minutes of the study on one core, roughly and without compiling: meshes, references, the recommended body."""
-    body = 0.0
-    if answer is not None and answer.chosen is not None and answer.chosen.cost.known:
-        body = answer.chosen.cost.value * answer.scene.duration
-    return (MESHING + SECONDS_PER_UNKNOWN * ReferencePlan().most + body) / 60.0
 
 
 def lines_of(placing: Proposal) -> list[str]:

@@ -13,7 +13,7 @@ from studies.exchange.entry import ENTRY
 from studies.runs.run import own_files_of
 from studies.runs.run import replay as replay_run
 from studies.runs.user_code import load_file
-from studies.store.record import Record, peek
+from studies.store.record import peek
 
 
 def replay(
@@ -52,7 +52,12 @@ def load_own_files(path: Path, given: list[Path], changed: bool) -> None:
     record = peek(path)
     if record.attributes.get(ENTRY) is not None:
         raise StudyError(f"{path} is a result of another program: only that program can run it again")
-    digests = _own_files(path, record)
+    try:
+        digests = own_files_of(record)
+    except ValueError:
+        digests = None
+    if not isinstance(digests, dict) or not all(isinstance(digest, str) for digest in digests.values()):
+        raise DamagedFile(f"{path} does not say which files it was made with: delete it, or run its study again")
     by_name = {file.name: file for file in given}
     if len(digests) == len(given) == 1:
         by_name = {Path(name).name: given[0] for name in digests}
@@ -71,14 +76,3 @@ def load_own_files(path: Path, given: list[Path], changed: bool) -> None:
             warn([sentence])
     for file in files:
         load_file(file)
-
-
-def _own_files(path: Path, record: Record) -> dict[str, str]:
-    """As `own_files_of`. Raises DamagedFile for a text that this program does not write."""
-    try:
-        digests = own_files_of(record)
-    except ValueError:
-        digests = None
-    if not isinstance(digests, dict) or not all(isinstance(digest, str) for digest in digests.values()):
-        raise DamagedFile(f"{path} does not say which files it was made with: delete it, or run its study again")
-    return digests

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, Any
 
 import typer
 
@@ -70,15 +70,41 @@ def why_empty(ledger: Ledger, study: Study, word: str) -> str:
 
 
 def draw(rows: Sequence[Row], metrics: list[Metric], every: bool) -> None:
-    """What all rows share in a line, then as many metrics as the terminal is wide, or all in blocks."""
+    """What all rows share in a line, then as many metrics as the terminal is wide, or all in blocks: below a heading
+    for each scene and body, at the left what each row is called."""
     shared = [words.format(setting(rows[0], key)) for key, words in SETTINGS.items() if len(values(rows, key)) == 1]
     if shared:
         say(", ".join(shared))
-    layout, rest = Layout(rows), list(metrics)
+    groups: dict[str, list[int]] = {}
+    for number, row in enumerate(rows):
+        groups.setdefault(f"{row['scene']}, {row['body']}", []).append(number)
+    of_groups = [[rows[number] for number in numbers] for numbers in groups.values()]
+    differing = [key for key in SETTINGS if any(len(values(group, key)) > 1 for group in of_groups)]
+    of_heading = [key for key in SETTINGS if key not in differing and len(values(rows, key)) > 1]
+    height = 1 + max((len(metric.name.split("_")) for metric in metrics), default=0)
+    labels = [column(height, [""], [f"  {row['method']}" for row in rows], str.ljust)]
+    labels += [column(height, [key], [setting(row, key) for row in rows], str.ljust) for key in differing]
+    if any(row["status"] != "ok" for row in rows):
+        labels.append(column(height, ["status"], [row["status"] for row in rows], str.ljust))
+    rest = list(metrics)
     while rest:
-        columns = layout.fitting(rest)
-        say("\n".join(layout.block(columns)))
-        rest = rest[len(columns) :]
+        columns, width = list(labels), sum(len(label[-1]) + 2 for label in labels) - 2
+        for metric in rest:
+            one = column(
+                height, [*metric.name.split("_"), f"[{metric.unit}]"], [cell(row, metric) for row in rows], str.rjust
+            )
+            width += 2 + len(one[-1])
+            if len(columns) > len(labels) and width > console.width:
+                break
+            columns.append(one)
+        lines = ["  ".join(texts).rstrip() for texts in zip(*columns, strict=True)]
+        say("\n".join(filter(None, lines[: -len(rows)])))
+        for name, numbers in groups.items():
+            first = rows[numbers[0]]
+            say(", ".join([name, *(SETTINGS[key].format(setting(first, key)) for key in of_heading)]))
+            for number in numbers:
+                say(lines[number - len(rows)])
+        rest = rest[len(columns) - len(labels) :]
         if not every:
             break
     if any(row[UNRESOLVED] for row in rows):
@@ -87,70 +113,11 @@ def draw(rows: Sequence[Row], metrics: list[Metric], every: bool) -> None:
         say(f"not shown (--all, --csv FILE, --metrics): {', '.join(metric.name for metric in rest)}")
 
 
-class Column(NamedTuple):
-    """Texts below one another."""
-
-    head: list[str]
-    cells: list[str]
-
-    @property
-    def width(self) -> int:
-        """Of the longest."""
-        return max(map(len, (*self.head, *self.cells)))
-
-    def filled(self, height: int, justified: Callable[[str, int], str]) -> list[str]:
-        """All of one width, the head at the bottom of `height` lines."""
-        width = self.width
-        return [justified(text, width) for text in [""] * (height - len(self.head)) + self.head + self.cells]
-
-
-class Layout:
-    """Rows below a heading for each scene and body; at the left what each is called, then columns of metrics."""
-
-    def __init__(self, rows: Sequence[Row]) -> None:
-        self.rows = rows
-        self.groups: dict[str, list[int]] = {}
-        for number, row in enumerate(rows):
-            self.groups.setdefault(f"{row['scene']}, {row['body']}", []).append(number)
-        groups = [[rows[number] for number in group] for group in self.groups.values()]
-        differing = [key for key in SETTINGS if any(len(values(group, key)) > 1 for group in groups)]
-        self.shared = [key for key in SETTINGS if key not in differing and len(values(rows, key)) > 1]
-        ended = ["status"] if any(row["status"] != "ok" for row in rows) else []
-        self.labels = [Column([""], [f"  {row['method']}" for row in rows])]
-        self.labels += [Column([key], [setting(row, key) for row in rows]) for key in differing]
-        self.labels += [Column([key], [row[key] for row in rows]) for key in ended]
-
-    def heading(self, name: str) -> str:
-        """Of a group: what all of its rows share."""
-        first = self.rows[self.groups[name][0]]
-        return ", ".join([name, *(SETTINGS[key].format(setting(first, key)) for key in self.shared)])
-
-    def fitting(self, metrics: list[Metric]) -> list[Column]:
-        """Columns of as many of the first metrics as fit next to the labels; one at least."""
-        width, columns = sum(column.width + 2 for column in self.labels) - 2, list[Column]()
-        for metric in metrics:
-            column = Column(head(metric), [cell(row, metric) for row in self.rows])
-            width += 2 + column.width
-            if columns and width > console.width:
-                break
-            columns.append(column)
-        return columns
-
-    def block(self, columns: list[Column]) -> list[str]:
-        """Lines: a head with the units, then all rows, under their headings."""
-        height = max(len(column.head) for column in (*self.labels, *columns))
-        texts = [column.filled(height, str.ljust) for column in self.labels]
-        texts += [column.filled(height, str.rjust) for column in columns]
-        lines = ["  ".join(line).rstrip() for line in zip(*texts, strict=True)]
-        block = lines[:height]
-        for name, numbers in self.groups.items():
-            block += [self.heading(name), *(lines[height + number] for number in numbers)]
-        return block
-
-
-def head(metric: Metric) -> list[str]:
-    """Its name, word by word, and its unit."""
-    return [*metric.name.split("_"), f"[{metric.unit}]"]
+def column(height: int, head: list[str], cells: list[str], justified: Callable[[str, int], str]) -> list[str]:
+    """Texts of one width below one another: `height` lines that end with the head, then the cells."""
+    texts = [""] * (height - len(head)) + head + cells
+    width = max(map(len, texts))
+    return [justified(text, width) for text in texts]
 
 
 def values(rows: Sequence[Row], key: str) -> set[str]:
