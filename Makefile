@@ -37,7 +37,8 @@ study-league: setup-run ## all programs and ours on the open scenes of the leagu
 # What is current is skipped; so the same command goes on where it was interrupted.
 publish: setup-verify compiled ## all that is published, again, by this machine (half a day; goes on where it was interrupted)
 	$(BIN)/organbench run $$($(BIN)/python -c "import studies; print(*(study.name for study in studies.STUDIES))")
-	$(BIN)/organbench run population
+	$(BIN)/organbench run studies/lab/population/study.py
+	$(BIN)/python -m studies.lab.population
 	$(BIN)/python -m studies.lab.verify
 	$(BIN)/organbench report --figures
 	$(BIN)/python -m studies.lab.silicone

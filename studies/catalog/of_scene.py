@@ -7,9 +7,12 @@ from studies.catalog.accuracy import FINEST, LONG, even, graded
 from studies.catalog.study import Chart, Study
 from studies.runs.case import Case
 from studies.runs.recipes import BodyRecipe, TetrahedralBody
+from studies.scene.library import LIVER_PROBE
 from studies.scene.scene import Scene
 
 RECORDED = ("surface",)
+BODIES = "bodies"
+"""Stands for the study of a folder of surfaces where no other is named."""
 
 
 def study_of(scene: Scene) -> Study:
@@ -27,6 +30,11 @@ def study_of(scene: Scene) -> Study:
     )
     columns = ("volume_worst", "force_end", "mean_error", "shape_error", "shape_volume", "silhouette_error", "min_j")
     return Study(scene.name, f"How do four bodies do in {scene.title}?", cases, charts, columns)
+
+
+def bodies() -> Study:
+    """The same four bodies, to be taken to the organs of a folder (studies.catalog.folder)."""
+    return replace(study_of(LIVER_PROBE), name=BODIES, question="How do four bodies do in each organ?")
 
 
 def _two_meshes(scene: Scene) -> tuple[BodyRecipe, ...]:

@@ -11,7 +11,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from studies.metrics.judged import DISPLACEMENT, FORCE
 from studies.metrics.metric import PERCENT
 from studies.metrics.metrics import contact_facets
 from studies.metrics.run import Run, by_scene
@@ -83,63 +82,12 @@ def apart(coarse: Run, fine: Run) -> Apart:
 def verdicts(runs: Sequence[Run]) -> list[Verdict]:
     """Verdicts from the two finest meshes of each scene without a reference in which a graded quadratic recipe ran on
     two or more meshes."""
-    pairs = _pairs([run for run in runs if run.reference is None])
+    pairs = pairs_of([run for run in runs if run.reference is None])
     finest = {(coarse.case.scene.name, _without_nodes(coarse.case.body)): (coarse, fine) for coarse, fine in pairs}
     return [_verdict(scene, *pair) for (scene, _), pair in finest.items()]
 
 
-class Judgement(NamedTuple):
-    """Result of the comparison of two meshes in a scene, and of that with its reference."""
-
-    scene: str
-    nodes: int
-    """Nodes of the finer body."""
-    apart: Apart
-    alike: bool
-    """Whether the difference of the two is within the target errors."""
-    trusted: bool
-    within: bool
-    """Whether the errors of the finer body are within the target."""
-
-
-def judgements(runs: Sequence[Run]) -> list[Judgement]:
-    """Judgements of each scene with a reference, for neighbouring sizes of each graded quadratic recipe. Only a finer
-    body with ENOUGH nodes may be trusted."""
-    judged = []
-    for coarse, fine in _pairs([run for run in runs if run.reference is not None]):
-        scene, between = fine.case.scene, apart(coarse, fine)
-        wish = usual_wish(scene)
-        errors = ((FORCE, wish.force), (DISPLACEMENT, wish.displacement))
-        values = [(abs(entry(fine)), bound) for entry, bound in errors if bound is not None]
-        right = [value <= bound for value, bound in values if value == value]
-        if not right:  # no error is known
-            continue
-        trusted = not doubt_of(coarse, fine) and within(between, wish, allowed_share(scene))
-        alike = within(between, wish, 1.0)
-        judged.append(Judgement(scene.name, fine.case.body.nodes, between, alike, trusted, all(right)))
-    return judged
-
-
-class Tally(NamedTuple):
-    """Counts of judgements."""
-
-    beyond: int
-    """Scenes whose error exceeds the target."""
-    named: int
-    """Of these those that are not trusted."""
-    within: int
-    """Scenes whose error is within the wish."""
-    doubted: int
-    """Of these those that are not trusted."""
-
-
-def tally(judged: Sequence[Judgement]) -> Tally:
-    """Counts how many bodies beyond the target are not trusted, and how many within it are not trusted."""
-    bad, good = [one for one in judged if not one.within], [one for one in judged if one.within]
-    return Tally(len(bad), sum(not one.trusted for one in bad), len(good), sum(not one.trusted for one in good))
-
-
-def _pairs(runs: Sequence[Run]) -> list[tuple[Run, Run]]:
+def pairs_of(runs: Sequence[Run]) -> list[tuple[Run, Run]]:
     """Pairs of runs that ended well, of neighbouring sizes of a graded quadratic recipe in a scene, the coarse one
     first."""
     pairs = []

@@ -3,16 +3,10 @@
 from collections.abc import Callable, Sequence
 
 from studies.metrics.run import Run
-from studies.report.population import members_of, trust_of, worst_of
 from studies.report.summary import ladder_of, recommended_of, results_of
 
 SUMMARIES: dict[str, dict[str, Callable[[Sequence[Run]], str]]] = {
     "volume_loss": {"summary.md": results_of},
     "accuracy": {"accuracy/recommended.md": recommended_of, "accuracy/ladder.md": ladder_of},
-    "population": {
-        "population/population.md": members_of,
-        "population/worst.md": worst_of,
-        "population/trust.md": trust_of,
-    },
 }
 """Study -> file below the results folder -> its text."""

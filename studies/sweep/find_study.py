@@ -2,7 +2,7 @@
 
 import math
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -11,12 +11,15 @@ from studies.base.errors import StudyError
 from studies.base.lookup import lookup
 from studies.catalog import STUDIES, Study
 from studies.catalog.demo import DEMO
+from studies.catalog.of_scene import BODIES, bodies
 from studies.runs.case import Case, case_from_json, case_to_dict
 from studies.scene.clock import check_clock
 from studies.sweep.find_scene import SUFFIX, read_user_file
 
 ON = "@"
-"""Between the name of a study and a folder of surfaces: "population@meshes", or "population@meshes:mm"."""
+"""Between the name of a study and a folder of surfaces: "accuracy@meshes", or "accuracy@meshes:mm"."""
+MOVED = {"population": "studies/lab/population/study.py"}
+"""Studies that were in the catalogue."""
 NO_CASE = "the text is not a stored case: "
 """How `case_from_json` begins; of a case that was never stored these words say nothing."""
 FEWEST = 4
@@ -34,7 +37,7 @@ def find_study(name: str) -> Study:
     if ON in name:
         return _on_folder(*name.split(ON, 1))
     if not name.endswith(SUFFIX):
-        return catalogue_studies([name])[0]
+        return catalogue_study(name)
     study = replace(read_user_file(name).as_study, word=name)
     file = Path(name).name
     if not study.cases:
@@ -49,14 +52,10 @@ def find_study(name: str) -> Study:
 
 
 def _on_folder(name: str, given: str) -> Study:
-    from studies.catalog.population import (  # with the geometry of scans, which takes a while to load
-        POPULATION,
-        study_of_recipes,
-        study_on,
-    )
+    from studies.catalog.folder import study_on  # with the geometry of scans, which takes a while to load
 
     folder, _, unit = given.partition(":") if not Path(given).is_dir() else (given, "", "")
-    study = study_of_recipes() if name == POPULATION else find_study(name)
+    study = bodies() if name == BODIES else find_study(name)
     study, placed = study_on(study, Path(folder), unit or None)
     for one in placed:
         sentence = "; ".join(one.words)
@@ -65,17 +64,11 @@ def _on_folder(name: str, given: str) -> Study:
     return replace(study, word=f"{name}{ON}{given}")
 
 
-def catalogue_studies(names: Sequence[str]) -> list[Study]:
-    """Studies of the catalogue by name, and that of the population, which is drawn only when it is named.
-
-    Raises StudyError with the nearest name.
-    """
-    makers: dict[str, Callable[[], Study]] = {study.name: lambda study=study: study for study in (*STUDIES, DEMO)}
-    if not makers.keys() >= set(names):
-        from studies.catalog.population import POPULATION, population_study  # as above
-
-        makers[POPULATION] = population_study
-    return [lookup(name, makers, "study")() for name in names]
+def catalogue_study(name: str) -> Study:
+    """A study of the catalogue by name. Raises StudyError with the nearest name, and for one that is a file now."""
+    if name in MOVED:
+        raise StudyError(f"the study '{name}' is a file of a clone: {MOVED[name]}")
+    return lookup(name, {study.name: study for study in (*STUDIES, DEMO)}, "study")
 
 
 def find_studies(names: Sequence[str]) -> list[Study]:

@@ -5,7 +5,6 @@ from pathlib import Path
 import typer
 
 from studies.catalog import STUDIES
-from studies.catalog.population import POPULATION
 from studies.cli.terminal import Results, busy, say
 from studies.tools.doctor.finding import Finding, Level
 from studies.tools.doctor.machine import machine
@@ -16,7 +15,7 @@ from studies.tools.doctor.software import software
 def doctor(results: Results = Path("results")) -> None:
     """Check this installation, its caches and its results. Exit code 1: something needed is missing."""
     with busy("looking at packages, caches and results"):
-        names = {POPULATION, *(study.name for study in STUDIES)}
+        names = {study.name for study in STUDIES}
         findings = [*software(), *machine(results), *results_folder(results, names)]
     for finding in findings:
         show(finding)

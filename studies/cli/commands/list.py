@@ -9,15 +9,13 @@ from rich.table import Table
 from massspring import LITERATURE, METHODS
 from studies.base.lookup import lookup
 from studies.catalog import STUDIES
-from studies.catalog.population import POPULATION
-from studies.catalog.population import study as population
 from studies.cli.terminal import console
 from studies.geometry.organs import SHAPES
 from studies.metrics.metrics import METRICS
 from studies.scene.library import CUT, SCENES
 
 KINDS = {
-    "studies": [*((study.name, study.question) for study in STUDIES), (POPULATION, population.__doc__)],
+    "studies": [(study.name, study.question) for study in STUDIES],
     "scenes": [(scene.name, scene.title) for scene in (*SCENES, *CUT)],
     "organs": [(name, make.__doc__) for name, make in SHAPES.items()],
     "methods": [(method.name, method.__doc__) for method in (*METHODS, *LITERATURE)],

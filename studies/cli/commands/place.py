@@ -9,7 +9,7 @@ import typer
 from studies.base.atomic import write_whole
 from studies.base.errors import StudyError
 from studies.base.lookup import lookup
-from studies.catalog.population.folder import placed_scene
+from studies.catalog.folder import placed_scene
 from studies.cli.mesh_files import MM, LongestSide, Part, Scale, Unit, Yes, in_metres, settled, source_of, working
 from studies.cli.terminal import say, warn
 from studies.geometry import BallRegion, scan

@@ -14,6 +14,7 @@ from studies.base.errors import StudyError
 from studies.base.lookup import lookup
 from studies.catalog import STUDIES, Study
 from studies.catalog.checks import check_study
+from studies.catalog.of_scene import BODIES
 from studies.cli import terminal
 from studies.cli.options import case_named
 from studies.cli.progress import TerminalProgress, dry_run
@@ -82,9 +83,7 @@ def run(
     rules = [lookup(word.strip(), RULES, "filter") for word in only.split(",")] if only else []
     ledger, failures, well = Ledger(results / SMOKE if smoke else results), Failures(), True
     if organs:
-        from studies.catalog.population import POPULATION  # with the geometry of scans, which takes a while to load
-
-        studies = [f"{name}{ON}{organs}" for name in studies or [POPULATION]]
+        studies = [f"{name}{ON}{organs}" for name in studies or [BODIES]]
     chosen = [study.smoke() if smoke else study for study in find_studies(studies or [])]
     if case:
         chosen = [replace(study, cases=(case_named(study, case),)) for study in chosen]

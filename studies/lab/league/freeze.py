@@ -14,8 +14,8 @@ from pathlib import Path
 from typing import Any
 
 from studies import BALL_CLAMPED, BALL_SQUEEZE, KIDNEY_PROBE, LIVER_PRESS, LIVER_PROBE, Scene, export
-from studies.catalog.population.draw import member
 from studies.exchange.league import FILE, SET
+from studies.lab.population.draw import member
 from studies.reference.load import load_reference
 from studies.reference.publish import write_file
 from studies.reference.published import FOLDER, INDEX, physics

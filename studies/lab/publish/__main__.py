@@ -17,7 +17,7 @@ PUBLISHED = Path("results/published")
 """The only part of results/ that git keeps."""
 POPULATION = "population"
 EXTRAS = {
-    POPULATION: "organbench run population",
+    POPULATION: "organbench run studies/lab/population/study.py",
     "league": "make study-league",
     "verify": "python -m studies.lab.verify",
     "figures": "organbench report --figures",

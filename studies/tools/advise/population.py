@@ -1,13 +1,12 @@
 """What a recipe did on organs it was never chosen on: the bound that 95 of 100 members of a population kept."""
 
+import re
 from dataclasses import dataclass
 from pathlib import Path
 
 import pandas as pd
 
 from studies.base.errors import StudyError
-from studies.catalog.population import POPULATION
-from studies.catalog.population.draw import organ_of
 from studies.metrics.distribution import Distribution, distribution
 from studies.metrics.judged import DISPLACEMENT, FORCE
 from studies.metrics.metric import Metric
@@ -15,6 +14,9 @@ from studies.runs.case import Case
 from studies.runs.recipe_text import recipe_text
 from studies.store.record import Status
 from studies.tools.advise.campaign import PUBLISHED, published_for
+
+POPULATION = "population"
+"""Folder and table of the study of random organs, which studies/lab/population draws."""
 
 
 @dataclass(frozen=True)
@@ -43,8 +45,16 @@ def unseen(results: Path, case: Case) -> Unseen | None:
         rows = rows.loc[(rows["scene"].map(organ_of) == organ) & (rows["recipe"] == recipe_text(case))]
         force, displacement = (_of(rows, entry) for entry in (FORCE, DISPLACEMENT))
     except (KeyError, ValueError, OSError) as error:
-        raise StudyError(f"{path} cannot be read ({error}); `organbench run {POPULATION}` writes it again") from error
+        raise StudyError(
+            f"{path} cannot be read ({error}); remove it, or run studies/lab/population/study.py again"
+        ) from error
     return Unseen(organ, force, displacement, str(path)) if displacement.count else None
+
+
+def organ_of(name: str) -> str | None:
+    """The organ of a member by its name, such as liver_0_007; None where it is none."""
+    found = re.fullmatch(r"([a-z]+)_\d+_\d+", name)
+    return found[1] if found else None
 
 
 def _of(rows: pd.DataFrame, entry: Metric) -> Distribution:

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from studies.base.errors import StudyError
-from studies.catalog.population.draw import member
 from studies.exchange.league import FILE, LEAGUE, SET, EntryFile, frozen
 from studies.exchange.meshes import given_mesh
+from studies.lab.population.draw import member
 from studies.reference.published import physics, published
 from studies.report.league.rows import COST, COUNT, league_rows
 from studies.scene.library import BALL_SQUEEZE, SCENES

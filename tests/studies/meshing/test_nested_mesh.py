@@ -11,10 +11,10 @@ from reference_fem import NewtonSettings, facet_nodes, nodes
 from reference_fem.elements.shapes import build_elements, check_neighbours, element_nodes
 from reference_fem.system.saddle_point import System
 from studies.base.errors import StudyError
-from studies.catalog.population.draw import member
 from studies.geometry import HalfSpace
 from studies.geometry.mesh.organ_mesh import tetrahedron_volumes
 from studies.geometry.mesh.quality import smallest_jacobian
+from studies.lab.population.draw import member
 from studies.meshing.held_mesh import held_mesh, with_patches
 from studies.meshing.kept_shape import area_error
 from studies.meshing.nested_mesh import LEAST, LOST, SHARE, NestedMesh, at_nodes, base_mesh, marked, upright

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from massspring import Plane, Trajectory
-from studies.catalog.population.draw import Population
 from studies.geometry import LIVER_PRESS_DIRECTION, SHAPES, vary
+from studies.lab.population.draw import Population
 from studies.meshing import graded_mesh
 from studies.meshing.scene_mesh import mesh_for
 from studies.metrics.metrics import mean_error

@@ -1,13 +1,11 @@
 """Two meshes of one scene that agree are trusted; two that differ are not."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from studies.catalog.of_scene import study_of
-from studies.cli.commands.run import say_trust
 from studies.geometry import HalfSpace
 from studies.meshing.kept_shape import tell_shape
 from studies.metrics.trust import FEW_FACETS, Apart, apart, doubt, verdicts, within
@@ -19,7 +17,6 @@ from studies.scene.library.liver_probe import LIVER_PROBE
 from studies.scene.library.spleen_sag import SPLEEN_SAG
 from studies.store.record import Status
 from tests.studies import made_up_run
-from tests.studies.tiny import tiny_study
 
 FINE = QuadraticBody(1594, graded="adaptive")
 COARSE = replace(FINE, nodes=1194)
@@ -133,9 +130,7 @@ def test_one_mesh_is_no_verdict_and_a_failed_run_none():
     assert verdicts([body_run(FINE), body_run(replace(COARSE, graded=True))]) == []
 
 
-@pytest.mark.parametrize(("shift", "answer"), [(0.9999, "yes"), (0.9, "no: use more nodes")])
-def test_a_run_of_a_scene_ends_with_the_verdict(monkeypatch, capsys, shift, answer):
-    runs = [body_run(COARSE, shift=shift), body_run(FINE)]
-    monkeypatch.setattr("studies.cli.commands.run.load_runs", lambda root, study: (runs, []))
-    say_trust(Path(), tiny_study())
-    assert f"ball_clamped: trust its best body: {answer}, because two meshes" in capsys.readouterr().out
+@pytest.mark.parametrize(("shift", "trusted"), [(0.9999, True), (0.9, False)])
+def test_two_meshes_of_a_scene_without_a_reference_are_compared(shift, trusted):
+    (verdict,) = verdicts([body_run(COARSE, shift=shift), body_run(FINE)])
+    assert (verdict.scene, verdict.trusted) == ("ball_clamped", trusted) and "two meshes" in verdict.why

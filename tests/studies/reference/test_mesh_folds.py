@@ -11,9 +11,9 @@ from skfem.refdom import RefTet
 from reference_fem import SolveError, facet_nodes, nodes
 from reference_fem.elements.shapes import build_elements, check_neighbours, element_nodes
 from studies.base.errors import StudyError
-from studies.catalog.population import member
 from studies.geometry import curved
 from studies.geometry.mesh.quality import curved_volume
+from studies.lab.population.draw import member
 from studies.meshing.held_mesh import held_mesh
 from studies.meshing.reference_mesh import on_true_sides, reference_mesh
 from studies.meshing.scene_mesh import mesh_for

@@ -1,4 +1,4 @@
-"""A folder of surfaces as a population: each one meshed, held and palpated by rule, or refused with a reason."""
+"""A folder of surfaces as a study: each one meshed, held and palpated by rule, or refused with a reason."""
 
 import warnings
 from collections.abc import Iterator
@@ -8,15 +8,13 @@ from pathlib import Path
 import studies.geometry as geometry
 from massspring import Sphere, Trajectory
 from studies.base.errors import StudyError
-from studies.catalog.population.draw import CHECKPOINTS, FRAMES, GAP, PRESSED
-from studies.catalog.population.ranges import MEMBER as PLAN
 from studies.catalog.study import Study
 from studies.geometry.files.units import Source, check_unit, stem_of
 from studies.scene.chosen_place import DEPTH, RADIUS
 from studies.scene.kind import has_wall
 from studies.scene.placing import along, press_times, scaled
 from studies.scene.proposal import Proposal, proposal
-from studies.scene.scene import ForceOutput, Held, Organ, Scene
+from studies.scene.scene import ForceOutput, Held, Organ, ReferencePlan, Scene
 from studies.scene.scene_file import python_name
 from studies.scene.tissues import LIVER, Tissue
 from studies.store.paths import readable
@@ -30,6 +28,11 @@ NODES = 550
 """Of the mesh on which hold and probe are placed."""
 DURATION, DAMPING = 8.0, 8.0
 """[s], [1/s]: as in the scenes of the liver."""
+GAP, PRESSED = 0.0005, 0.6
+"""Between probe and surface at the start [m]; share of the duration in which the probe moves."""
+CHECKPOINTS, FRAMES = 2, 80
+PLAN = ReferencePlan(variants=(), tolerance=0.01, most=90e3)
+"""A minute of processor time; bars of up to half of the target in force, 0.6 % in mean displacement."""
 
 
 @dataclass(frozen=True)

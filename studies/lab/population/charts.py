@@ -8,10 +8,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from studies import Metric, Run
 from studies.base.counting import heading
 from studies.metrics.distribution import BOUND, ENOUGH, Group, groups
-from studies.metrics.metric import Metric
-from studies.metrics.run import Run
 from studies.metrics.table import metric
 from studies.metrics.wish import usual_wish
 from studies.plots.style.families import family_of

@@ -7,14 +7,12 @@ from functools import cache
 import numpy as np
 
 from massspring import Plane, Ramp, Sphere, Trajectory
-from studies.base.errors import StudyError
-from studies.base.lookup import lookup
-from studies.catalog.population.ranges import RANGES, Filling, Palpation, Sagging
-from studies.geometry import SHAPES, vary
+from studies import SHAPES, Lumen, Organ, Scene, StudyError
+from studies.geometry import vary
 from studies.geometry.organs.millimetres import probe_near
 from studies.geometry.shape.levelset import PalpationPoint, Shape, normals
+from studies.lab.population.ranges import RANGES, Filling, Palpation, Sagging
 from studies.scene.placing import Vector, along, press_times, probe_of, scaled
-from studies.scene.scene import Lumen, Organ, Scene
 
 NAME = "{organ}_{seed}_{number:03d}"
 """Of a member's scene."""
@@ -42,14 +40,6 @@ class Population:
     count: int
     seed: int = 0
 
-    def __post_init__(self) -> None:
-        lookup(self.organ, RANGES, "organ of a population")
-        for name, value, least in (("count", self.count, 1), ("seed", self.seed, 0)):
-            if isinstance(value, bool) or not isinstance(value, int) or value < least:
-                raise StudyError(
-                    f"population of {self.organ}: {name} is {value!r}; give a whole number from {least} on"
-                )
-
     def scenes(self) -> tuple[Scene, ...]:
         """The scenes of all members. Raises StudyError for a member that cannot be palpated anywhere."""
         return tuple(member(self.organ, self.seed, number) for number in range(self.count))
@@ -58,9 +48,9 @@ class Population:
 def member(organ: str, seed: int, number: int) -> Scene:
     """The scene of member `number` of a population: the same for the same three, however many members are drawn.
 
-    Raises StudyError for an organ without ranges, and for a member on which no place for the probe is found.
+    Raises StudyError for a member on which no place for the probe is found.
     """
-    ranges = lookup(organ, RANGES, "organ of a population")
+    ranges = RANGES[organ]
     rng = np.random.default_rng([seed, number, zlib.crc32(organ.encode())])
     parameters = vary(organ, int(rng.integers(2**32)), ranges.spread)
     if ranges.wall is not None:
@@ -125,12 +115,6 @@ def _hanging(scene: Scene, acceleration: float) -> Scene:
         title=f"A {scene.organ.shape} of a population, hanging under {acceleration:.1f} m/s²",
         gravity=pull,
     )
-
-
-def organ_of(name: str) -> str | None:
-    """The organ of a member by its name; None where it is none."""
-    organ, *numbers = name.rsplit("_", 2)
-    return organ if organ in RANGES and len(numbers) == 2 and all(map(str.isdigit, numbers)) else None
 
 
 def _palpated(

@@ -1,4 +1,4 @@
-"""A folder of surfaces as a population: placed by rule, repaired, or refused with a reason."""
+"""A folder of surfaces as a study: placed by rule, repaired, or refused with a reason."""
 
 import warnings
 
@@ -8,7 +8,7 @@ import pytest
 
 from massspring import ImplicitVolume
 from studies.base.errors import StudyError
-from studies.catalog.population import placed_organs, study_on
+from studies.catalog.folder import placed_organs, study_on
 from studies.catalog.study import Study
 from studies.geometry import organ
 from studies.runs.case import Case
@@ -62,14 +62,14 @@ def test_the_study_asks_its_solid_recipes_of_every_organ(folder):
 def test_it_has_a_name_that_every_command_understands(folder):
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-        study = find_study(f"population@{folder}:mm")
-    assert {case.scene.name for case in study.cases} == {"whole"} and len(study.cases) == 7
+        study = find_study(f"bodies@{folder}:mm")
+    assert {case.scene.name for case in study.cases} == {"whole"} and len(study.cases) == 4
     assert sum("is refused" in str(warning.message) for warning in caught) == 2
 
 
 def test_what_is_no_folder_of_organs_is_refused(folder, tmp_path):
     with pytest.raises(StudyError, match="there is no folder"):
-        find_study(f"population@{tmp_path / 'gone'}")
+        find_study(f"accuracy@{tmp_path / 'gone'}")
     with pytest.raises(StudyError, match="has no surface"):
         study_on(ONE, tmp_path)
     with pytest.raises(StudyError, match="unit"):

@@ -1,19 +1,17 @@
-"""How accurate is each body on organs nobody has seen: the median, and the worst of twenty?"""
+"""How accurate is each body on organs nobody has seen: the median, and the worst of twenty?
+
+`organbench run studies/lab/population/study.py` brings it up to date.
+"""
 
 from collections.abc import Sequence
 from dataclasses import replace
 
 from massspring import ImplicitVolume
+from studies import BodyRecipe, Case, Chart, Scene, Study, SurfaceBody, TetrahedralBody
 from studies.catalog.accuracy import FINEST, LONG, SHORT, even, graded
-from studies.catalog.population.draw import Population
-from studies.catalog.study import Chart, Study
-from studies.runs.case import Case
-from studies.runs.recipes import BodyRecipe, SurfaceBody, TetrahedralBody
-from studies.scene.kind import has_wall
-from studies.scene.scene import Scene
+from studies.lab.population.draw import Population
 
 POPULATION = "population"
-"""The study that `organbench run population` brings up to date."""
 MEMBERS = (
     Population("liver", 100),
     Population("kidney", 100),
@@ -29,7 +27,7 @@ def recipes_for(scene: Scene) -> tuple[tuple[BodyRecipe, float], ...]:
     """The bodies that every member gets, and their step over the limit: the paper's; one volume; one volume per node;
     the fastest even quadratic body; the graded ones of the accuracy study, and a finer one, which shows what a larger
     budget of computing time is worth."""
-    axis = "centre_line" if has_wall(scene) else "straight"
+    axis = "centre_line" if "wall" in scene.organ.parameters else "straight"
     budgets = (*graded(scene), *(replace(body, nodes=FINEST) for body in graded(scene)[-1:]))
     return (
         (SurfaceBody(NODES, axis=axis), SHORT),
@@ -50,15 +48,15 @@ def population_study(populations: Sequence[Population] = MEMBERS, name: str = PO
     turns = [scenes[at] for at in range(max(map(len, drawn), default=0)) for scenes in drawn if at < len(scenes)]
     return Study(
         name=name,
-        question=__doc__ or "",
+        question="How accurate is each body on organs nobody has seen: the median, and the worst of twenty?",
         cases=tuple(
             Case(scene, body, ImplicitVolume(), dt_fraction=fraction, timed=scene in first)
             for scene in turns
             for body, fraction in recipes_for(scene)
         ),
         charts=(
-            Chart("distributions.png", "studies.plots.campaigns.population:draw"),
-            Chart("front.png", "studies.plots.campaigns.population:draw_front"),
+            Chart("distributions.png", "studies.lab.population.charts:draw"),
+            Chart("front.png", "studies.lab.population.charts:draw_front"),
         ),
         counts_losses=True,
         scene_by_scene=True,
@@ -76,6 +74,4 @@ def population_study(populations: Sequence[Population] = MEMBERS, name: str = PO
     )
 
 
-def study_of_recipes() -> Study:
-    """The study on its first two members of each organ: it has every recipe, timed and not, and is drawn at once."""
-    return population_study([replace(population, count=2) for population in MEMBERS])
+STUDY = population_study()

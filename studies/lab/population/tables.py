@@ -5,19 +5,17 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from studies import Metric, Run, Status
+from studies.lab.population.warning import Judgement, judgements, tally
 from studies.metrics.distribution import Distribution, Group, groups
 from studies.metrics.judged import DISPLACEMENT, FORCE
-from studies.metrics.metric import Metric
 from studies.metrics.metrics import contact_facets, contact_turn
-from studies.metrics.run import Run
-from studies.metrics.trust import ENOUGH, Judgement, judgements, tally
-from studies.store.record import Status
+from studies.metrics.trust import ENOUGH
 
 WORST = 10
 """Number of members of each organ that are analysed."""
 CHOSEN_ON = {"liver": 27, "kidney": 27, "stomach": 27, "spleen": 30, "bladder": 30}
 """Members of each organ, the first ones, on which the rule of the warning was chosen (studies.metrics.trust)."""
-NONE = "No results yet: run `make study-population`."
 
 
 def members_of(runs: Sequence[Run]) -> str:
@@ -38,7 +36,7 @@ def members_of(runs: Sequence[Run]) -> str:
             f"{_number(force.floor)} / {_number(mean.floor)}",
         ]
         lines.append(f"| {group.organ} | {group.body} | " + " | ".join(cells) + " |")
-    return "\n".join(lines) if len(lines) > 2 else NONE
+    return "\n".join(lines)
 
 
 def _spread(one: Distribution, signed: bool = False) -> list[str]:
@@ -82,7 +80,7 @@ def worst_of(runs: Sequence[Run]) -> str:
         lines += [
             f"| {run.case.scene.name} | {run.record.status} |{' – |' * 5} {run.record.message} |" for run in failures
         ]
-    return "\n".join(lines) if len(lines) > 2 else NONE
+    return "\n".join(lines)
 
 
 def _value(entry: Metric, run: Run, sign: str = "") -> str:
@@ -119,8 +117,6 @@ def trust_of(runs: Sequence[Run]) -> str:
     is within, of the members on which its rule was chosen and of those drawn later; and how many bodies with fewer
     nodes, which are never trusted, are beyond the target and yet alike."""
     comparisons = judgements(runs)
-    if not comparisons:
-        return NONE
     lines = [
         "| organ | chosen on: beyond the target, named | within it, doubted "
         "| judged on: beyond the target, named | within it, doubted | fewer nodes: beyond the target, alike |",

@@ -2,8 +2,7 @@
 
 from dataclasses import dataclass, replace
 
-from studies.scene.library import BLADDER_FILL, KIDNEY_PROBE, LIVER_PROBE, SPLEEN_SAG, STOMACH_PROBE
-from studies.scene.scene import ReferencePlan, Scene
+from studies import BLADDER_FILL, KIDNEY_PROBE, LIVER_PROBE, SPLEEN_SAG, STOMACH_PROBE, ReferencePlan, Scene
 
 Range = tuple[float, float]
 MEMBER = ReferencePlan(variants=(), tolerance=0.01, most=90e3)

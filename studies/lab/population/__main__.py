@@ -1,0 +1,23 @@
+"""`python -m studies.lab.population`: the tables of random organs from what `organbench run` has stored of them."""
+
+import sys
+from pathlib import Path
+
+from studies import load_runs
+from studies.lab.population.study import POPULATION, STUDY
+from studies.lab.population.tables import members_of, trust_of, worst_of
+
+TEXTS = {"population.md": members_of, "worst.md": worst_of, "trust.md": trust_of}
+
+
+def main(results: Path = Path("results")) -> None:
+    runs, problems = load_runs(results, STUDY)
+    for name, text in TEXTS.items():
+        path = results / POPULATION / name
+        path.write_text(text(runs) + "\n", encoding="utf-8")
+        print(path)
+    print(*problems, sep="\n", file=sys.stderr)
+
+
+if __name__ == "__main__":
+    main(*map(Path, sys.argv[1:]))

@@ -1,0 +1,128 @@
+"""Members of a population: who they are does not depend on how many there are, each can be palpated, and tables count
+them right."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from massspring import Plane
+from studies import Case, QuadraticBody, Status
+from studies.geometry import organ
+from studies.lab.population.charts import figure, front
+from studies.lab.population.draw import Population, member
+from studies.lab.population.ranges import RANGES, Filling, Palpation, Sagging
+from studies.lab.population.study import population_study
+from studies.lab.population.tables import members_of, rigid_share, trust_of, worst_of
+from studies.lab.population.warning import judgements, tally
+from studies.scene.as_json import scene_from_dict, scene_to_json
+from tests.studies.made_up_run import POINTS, SCENE, bend, run
+
+pytestmark = pytest.mark.lab
+FINE = QuadraticBody(1594, graded="adaptive")
+COARSE = replace(FINE, nodes=1194)
+
+
+@pytest.mark.parametrize("name", RANGES)
+def test_a_larger_population_begins_with_the_smaller_one_and_stays_within_its_ranges(name):
+    ranges, scenes = RANGES[name], Population(name, 12, 3).scenes()
+    assert scenes[:2] == Population(name, 2, 3).scenes() and len({scene.name for scene in scenes}) == 12
+    assert scene_from_dict(json.loads(scene_to_json(scenes[5]))) == scenes[5]
+    drawn = [([scene.tissue.shear_modulus for scene in scenes], ranges.shear_modulus)]
+    match ranges.load:
+        case Palpation(radius, depth, _):
+            drawn += [([scene.obstacles[0].radius for scene in scenes], radius), (list(map(depth_of, scenes)), depth)]
+        case Filling(share):
+            drawn.append(([scene.lumen.filling.values[-1] for scene in scenes], share))
+        case Sagging(acceleration):
+            drawn.append(([-scene.gravity[2] for scene in scenes], acceleration))
+    for values, (low, high) in drawn:
+        assert low - 1e-9 <= min(values) and max(values) <= high + 1e-9 and np.ptp(values) >= 0.5 * (high - low)
+
+
+def depth_of(scene):
+    return np.linalg.norm(np.asarray(scene.obstacles[0].path.displacements)[-1]) - 0.0005
+
+
+@pytest.mark.parametrize(("name", "number"), [("liver", 0), ("kidney", 58), ("stomach", 1)])
+def test_a_probe_starts_clear_of_the_mesh_and_ends_inside_it_and_off_what_is_held(name, number):
+    """Judged by the meshed organ; at the first place that is drawn of kidney 58 the probe would end in the sinus."""
+    scene = member(name, 0, number)
+    mesh = organ(name, 430, scene.regions, False, scene.organ.parameters)
+    probe, points = scene.obstacles[0], mesh.points[: mesh.outer_count]
+    end = np.asarray(probe.centre) + probe.path.displacements[-1]
+    assert np.linalg.norm(points - probe.centre, axis=1).min() >= probe.radius - 1e-4
+    assert np.linalg.norm(points - end, axis=1).min() < probe.radius - 0.3 * depth_of(scene)
+    held = np.concatenate([points[nodes] for nodes in mesh.patches.values()])
+    assert np.linalg.norm(held - end, axis=1).min() > probe.radius
+    for wall in (obstacle for obstacle in scene.obstacles if isinstance(obstacle, Plane)):
+        assert 0.0 < wall.point[1] - mesh.points[:, 1].max() < 0.003
+
+
+def test_organs_take_turns_so_that_a_study_cut_short_has_them_all():
+    study = population_study((Population("liver", 2), Population("kidney", 1)), "turns")
+    assert [scene.name for scene in study.scenes] == ["liver_0_000", "kidney_0_000", "liver_0_001"]
+    assert len({case.name for case in study.cases}) == 3 * 7
+    assert {case.scene.name for case in study.cases if case.timed} == {"liver_0_000", "kidney_0_000"}
+
+
+@pytest.fixture
+def _flat_facets(monkeypatch):
+    monkeypatch.setattr("studies.metrics.run.six_node_facets", lambda triangles: triangles)
+
+
+def made(number, body, motion=bend, force=2.0, status=Status.OK):
+    """A member of a population; the force of its reference is 2 N."""
+    values = {"snapshots": np.stack([POINTS, POINTS + motion(POINTS)])}
+    one = run(force=force * np.array([0.25, 0.5, 0.75, 1.0]), values=values, status=status)
+    return replace(one, case=Case(replace(SCENE, name=f"liver_0_{number:03d}"), body))
+
+
+def shifted(x):
+    return bend(x) + np.array([0.0, 6e-3, 0.0])
+
+
+def squeezed(x):
+    return bend(x) + 2e-3 * (x - x.mean(axis=0)) * [1.0, 0.0, 0.0]
+
+
+@pytest.mark.usefixtures("_flat_facets")
+def test_a_rigid_motion_explains_itself_and_nothing_of_a_strain():
+    strain = made(0, FINE, squeezed)
+    assert rigid_share(made(0, FINE, shifted)) == pytest.approx(100.0, abs=0.2)  # triangles lean one way
+    assert rigid_share(strain) == pytest.approx(0.0, abs=0.2)
+    size = np.sqrt(np.average((strain.boundary_errors.wrong**2).sum(axis=1), weights=strain.boundary_errors.areas))
+    both = made(0, FINE, lambda x: squeezed(x) + np.array([0.0, 0.0, size]))
+    assert rigid_share(both) == pytest.approx(50.0, abs=0.2), "a shift and a strain of equal square mean"
+
+
+def bad_and_good():
+    """Members 0 and 1: both meshes right; 2: far apart and wrong; 3: alike and wrong; 4: apart, the finer right."""
+    pairs = [(2.0, 2.0), (2.0, 2.0), (2.6, 2.3), (2.3, 2.3), (2.3, 2.0)]
+    return [made(n, body, force=force) for n, pair in enumerate(pairs) for body, force in zip((COARSE, FINE), pair)]  # noqa: B905
+
+
+@pytest.mark.usefixtures("_flat_facets")
+def test_two_meshes_are_held_against_the_reference_and_counted():
+    verdicts = judgements(bad_and_good())
+    assert [one.within for one in verdicts] == [True, True, False, False, True]
+    assert [one.trusted for one in verdicts] == [True, True, False, True, False] and tally(verdicts) == (2, 1, 3, 1)
+    later = [*bad_and_good(), *(made(30, body, force=force) for body, force in ((COARSE, 2.6), (FINE, 2.3)))]
+    assert trust_of(later).splitlines()[-1] == "| all | 2, 1 | 3, 1 | 1, 1 | 0, 0 | – |"
+    fewer = [replace(one, case=replace(one.case, body=replace(one.case.body, nodes=one.case.body.nodes - 400)))
+             for one in bad_and_good()]  # fmt: skip
+    assert trust_of(fewer).splitlines()[-1] == "| all | – | – | – | – | 2, 1 |"
+
+
+@pytest.mark.usefixtures("_flat_facets")
+def test_the_worst_come_first_the_lost_are_named_and_what_is_not_compared_is_a_dash():
+    runs = [made(0, FINE), made(1, FINE, shifted), made(2, FINE, status=Status.INVERTED)]
+    rows = worst_of(runs).splitlines()[2:]
+    assert [row.split(" | ")[0][2:] for row in rows] == ["liver_0_001", "liver_0_000", "liver_0_002"]
+    assert "| inverted |" in rows[2]
+    quantities = ("surface", "volume")
+    still = [replace(one, case=replace(one.case, scene=replace(one.case.scene, quantities=quantities))) for one in runs]
+    assert "| 2, 1 | – | – | – | " in members_of(still).splitlines()[-1]
+    for draw in (figure, front):
+        assert len(draw(runs).axes) > 0
