@@ -100,7 +100,7 @@ def test_commands_of_a_page_exist(page):
 def test_targets_of_make_exist():
     targets = re.findall(r"^([\w%/.-]+(?: [\w%/.-]+)*):", read(ROOT / "Makefile"), re.M)
     names = {name for line in targets for name in line.split()}
-    made = {f"study-{study.name}" for study in STUDIES} | {"study-population"}
+    made = {f"study-{study.name}" for study in STUDIES}
     for page in PAGES:
         if page.name != HISTORY:
             for name in re.findall(r"(?:`|^    )make ([\w-]+)", read(page), re.M):
