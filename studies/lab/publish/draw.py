@@ -50,7 +50,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     with TemporaryDirectory() as folder:
         table = compared(drawn(seed, given.rows, STUDIES, given.published), given.published, Path(folder))
     print(table.to_string(index=False))
-    wrong = int((table["verdict"] == DIFFERS).sum())
+    wrong = table["verdict"].tolist().count(DIFFERS)
     print(f"{len(table) - wrong} of {len(table)} rows are what is published")
     return int(wrong > 0)
 
@@ -84,13 +84,12 @@ def compared(studies: Sequence[Study], published: Path, folder: Path) -> pd.Data
 def verdict(row: dict, table: pd.DataFrame) -> dict:
     """Of a row that was measured now, with the published one of the same case."""
     known = [name for name in SAME if row[name] != ""]  # a case that broke off before its body was made has no law
-    rows = table[(table[known] == pd.Series({name: row[name] for name in known})).all(axis=1)]
-    if rows.empty:
+    rows = [one for one in table.to_dict("records") if all(one[name] == row[name] for name in known)]
+    if not rows:
         return {"verdict": DIFFERS, "number": "no such row is published", "by": 1.0}
-    steps = (rows[STEP] - row[STEP]).abs().fillna(0.0)
-    return min(
-        (difference(row, one) for one in rows[steps == steps.min()].to_dict("records")), key=lambda one: one["by"]
-    )
+    steps = [apart(row[STEP], one[STEP]) for one in rows]
+    nearest = [one for one, step in zip(rows, steps, strict=True) if step == min(steps)]
+    return min((difference(row, one) for one in nearest), key=lambda one: one["by"])
 
 
 def difference(row: dict, old: dict) -> dict:
