@@ -15,7 +15,7 @@ from studies.geometry import SHAPES, organ
 from studies.metrics.run import Run
 from studies.metrics.table import metric, study_table
 from studies.report.kept_volume import kept_volumes
-from studies.report.league.page import league_cards, write_league
+from studies.report.league import write_league
 from studies.report.page.part import read_part, write_part
 from studies.report.page.write import write_page
 from studies.report.references import refresh_uncertainty, state_of
@@ -80,8 +80,8 @@ def report(
         refreshed = [refresh(ledger, study) for study in drawn]
         written = [path for paths, _ in refreshed for path in paths]
         remarks = [sentence for _, sentences in refreshed for sentence in sentences]
-    league, unread = write_league(ledger.root, with_report=True)
-    page, left_out = write_page(ledger.root, studies, league_cards(ledger.root))
+    league, cards, unread = write_league(ledger.root)
+    page, left_out = write_page(ledger.root, studies, cards)
     return [*written, *league, *([page] if page else [])], [*remarks, *unread, *left_out]
 
 

@@ -12,7 +12,7 @@ from studies.exchange.league import FILE, LEAGUE, SET, EntryFile, frozen
 from studies.exchange.meshes import given_mesh
 from studies.lab.population.draw import member
 from studies.reference.published import physics, published
-from studies.report.league.rows import COST, COUNT, league_rows
+from studies.report.league import COST, COUNT, league_rows
 from studies.scene.library import BALL_SQUEEZE, SCENES
 from studies.store.record import read_record
 

@@ -21,7 +21,7 @@ from studies.lab.league.adapters.stable_neo_hookean import PlainStableNeoHookean
 from studies.lab.league.programs import ADAPTERS, OURS, PROGRAMS, Program, Surroundings, entered
 from studies.lab.league.sweep import COST, DIALS, SHARE, SWEPT, best, worst_share
 from studies.plots.campaigns.league import SPARE
-from studies.report.league.rows import league_rows
+from studies.report.league import league_rows
 
 pytestmark = pytest.mark.lab
 NODES = 150

@@ -9,8 +9,7 @@ import pytest
 from studies.exchange.league import SET, frozen
 from studies.plots.campaigns.league import figure
 from studies.reference.published import published
-from studies.report.league.page import page, profiles
-from studies.report.league.rows import COLUMNS, COST, COUNT, cards, engines, pairs, profile, tolerance
+from studies.report.league import COST, COUNT, HEADS, cards, engines, page, pairs, profile, profiles, tolerance
 from studies.report.page.write import write_page
 from studies.scene.library import LIVER_PRESS
 from tests.studies.page.made_up_page import made_up_parts
@@ -33,7 +32,7 @@ def row(engine, scene, force, mean, cost, **more):
     return made | more
 
 
-LOST = {f"{name} {kind}[%]": NAN for name in COLUMNS for kind in ("", "floor ")}
+LOST = {f"{name} {kind}[%]": NAN for name in HEADS for kind in ("", "floor ")}
 ROWS = [
     row("a", "ball_squeeze", -2.0, NAN, 0.5),
     row("a", "liver_press", 8.0, 0.9, 2.0),
@@ -67,10 +66,7 @@ def test_a_profile_is_counted_by_hand():
     assert profile(ROWS, "b", 3.0, BARS) == []
     assert profile(ROWS, "mine", 1.0, BARS) == [(1.0, 1 / 3)] and profile(ROWS, "mine", 3.0, BARS)[-1] == (1.0, 2 / 3)
     assert profile(ROWS, "a", 1.0, BARS, COUNT) == []
-
-
-def test_no_tolerance_is_finer_than_the_reference():
-    """0.01 of 3 % is less than the uncertainty of the reference, 0.5 %."""
+    # 0.01 of 3 % is less than the uncertainty of the reference, 0.5 %.
     assert tolerance("force_end", 0.01, 0.5) == 0.5 and tolerance("force_end", 1.0, 0.5) == 3.0
     assert profile(ROWS, "mine", 0.01, BARS) == [(1.0, 1 / 3)]
 
@@ -92,18 +88,8 @@ def test_cards_say_the_range_and_the_reasons():
     assert rounded["ranges"]["penetration"] == "0"
 
 
-@pytest.mark.parametrize("with_report", [False, True])
-def test_the_page_links_to_a_report_only_where_one_is_written(with_report):
-    """The published copy has no report next to it."""
-    assert ("report.html" in page(ROWS, SVG, with_report).decode()) == with_report
-
-
-def made_page() -> str:
-    return page(ROWS, SVG).decode()
-
-
 def test_the_page_shows_every_row_and_every_hash_of_what_is_held_back():
-    text = made_page()
+    text = page(ROWS, SVG).decode()
     assert text.count('<th scope="row">') == len(ROWS) and text.count("<li><h3>") == 3
     assert "no &lt;planes&gt;" in text and "+2.9\u00a0±\u00a00.5" in text and SET in text
     for name, one in frozen().items():
@@ -139,7 +125,7 @@ def test_the_chart_has_a_line_for_each_engine_with_a_pair():
 @pytest.mark.parametrize("width", [360, 1280])
 def test_the_page_fits_a_window_and_asks_for_nothing(browser, tmp_path, width):
     file = tmp_path / "league.html"
-    file.write_text(made_page(), encoding="utf-8")
+    file.write_bytes(page(ROWS, SVG))
     context = browser.new_context(offline=True, viewport={"width": width, "height": 900})
     shown, requests, complaints = context.new_page(), [], []
     shown.on("request", lambda request: requests.append(request.url))

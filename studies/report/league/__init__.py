@@ -1,1 +1,0 @@
-"""The league of engines: its table, a card for each engine, and the page."""
