@@ -65,8 +65,9 @@ def missing_docstrings(package) -> list[str]:
             continue
         members = vars(thing).items() if inspect.isclass(thing) else ()
         own = [(f"{name}.{key}", one) for key, one in members if inspect.isfunction(one) and not key.startswith("_")]
-        # A dataclass without words gets its signature as a docstring.
-        found += [key for key, one in [(name, thing), *own] if (one.__doc__ or f"{name}(").startswith(f"{name}(")]
+        # A dataclass without words gets its signature as a docstring; a method may say what that of its base says.
+        words = {name: thing.__doc__, **{key: inspect.getdoc(one) for key, one in own}}
+        found += [key for key, said in words.items() if (said or f"{name}(").startswith(f"{name}(")]
     return found
 
 

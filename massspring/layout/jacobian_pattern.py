@@ -5,7 +5,6 @@ from scipy.sparse import csr_array
 
 from massspring.body.volumes import Volumes
 from massspring.kernels.arrays.volume_rows import VolumeRows
-from massspring.kernels.jit.simd4 import SIMD_WIDTH
 from massspring.layout.block_jacobi import each_alone
 from massspring.layout.ring_areas import edge_chains, quadrangles
 from massspring.layout.sell_chunks import aligned
@@ -41,10 +40,10 @@ def volume_rows(volumes: Volumes, nodes: int) -> VolumeRows:
         node_start=_starts(column, nodes),
         node_entry=by_node.astype(np.uint32),
         node_row=row[by_node].astype(np.uint32),
-        value=aligned((len(entries), SIMD_WIDTH), np.dtype(np.float64)),
-        node_value=aligned((len(entries), SIMD_WIDTH), np.dtype(np.float64)),
+        value=aligned((len(entries), 4), np.dtype(np.float64)),
+        node_value=aligned((len(entries), 4), np.dtype(np.float64)),
         matrix=np.zeros((dense, dense)),
-        node_vector=aligned((nodes, SIMD_WIDTH), np.dtype(np.float64)),
+        node_vector=aligned((nodes, 4), np.dtype(np.float64)),
         push=aligned((nodes, 3), np.dtype(np.float64)),
         clusters=each_alone(0 if dense else m),
         **{name: np.zeros(m) for name in OF_EACH_VOLUME},

@@ -58,5 +58,4 @@ class Barycentre(Method):
         return start(body, attachments, v, cells_of(body))
 
     def advance(self, state: State, boundary: BoundaryConditions) -> State:
-        """One frame."""
         return push_cells(state, boundary, self.bulk_modulus, True)

@@ -97,7 +97,6 @@ class Element(Method):
         return start(body, attachments, v, cells_of(body))
 
     def advance(self, state: State, boundary: BoundaryConditions) -> State:
-        """One frame."""
         if not self.hard:
             return push_cells(state, boundary, self.bulk_modulus, False)
         after, cells = begin_frame(state, boundary), own_cells(state)

@@ -33,7 +33,6 @@ class Free(Method):
     capabilities: ClassVar[Capabilities] = Capabilities("none", thin_probes=True, float32=True)
 
     def advance(self, state: State, boundary: BoundaryConditions) -> State:
-        """One frame."""
         after = begin_frame(state, boundary)
         free_frame(after.frame(boundary))
         return after

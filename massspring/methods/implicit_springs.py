@@ -62,7 +62,6 @@ class ImplicitSprings(Method):
         return replace(state, rows=rows, memory=Factors())
 
     def advance(self, state: State, boundary: BoundaryConditions) -> State:
-        """One frame."""
         after = begin_frame(state, boundary)
         assert after.rows is not None  # start() made them
         after.rows.lam[:] = after.lam + after.model.rest_lam

@@ -207,7 +207,6 @@ class ImplicitVolume(Method):
             object.__setattr__(self, "capabilities", replace(self.capabilities, **limits))
 
     def why_not(self, body: Body) -> str | None:
-        """Why the method cannot advance `body`; None when it can."""
         reason = self.capabilities.why_not(body)
         return why_not_recover(body) if reason is None and self.recovers else reason
 
@@ -221,7 +220,6 @@ class ImplicitVolume(Method):
         return replace(state, rows=rows._replace(clusters=clusters))
 
     def advance(self, state: State, boundary: BoundaryConditions) -> State:
-        """One frame."""
         if state.memory is not None:
             if not is_back(state.memory, state.nodes.x):
                 simple = self.advance(*simpler(state, state.memory, boundary))

@@ -41,5 +41,4 @@ class Penalty(Method):
         return volume_stiffness(body, self.bulk_modulus)
 
     def advance(self, state: State, boundary: BoundaryConditions) -> State:
-        """One frame."""
         return push(state, boundary, self.bulk_modulus, PENALTY)

@@ -41,5 +41,4 @@ class Pressure(Method):
         return volume_stiffness(body, self.ambient)
 
     def advance(self, state: State, boundary: BoundaryConditions) -> State:
-        """One frame."""
         return push(state, boundary, self.ambient, GAS)

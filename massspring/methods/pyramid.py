@@ -40,5 +40,4 @@ class Pyramid(Method):
         return volume_stiffness(body, self.bulk_modulus)
 
     def advance(self, state: State, boundary: BoundaryConditions) -> State:
-        """One frame."""
         return push(state, boundary, self.bulk_modulus, PYRAMIDS)

@@ -55,7 +55,6 @@ class SemiImplicit(Method):
         return start(body, attachments, v, memory=Prepared(body.kept.jacobian(body.rest), {}))
 
     def advance(self, state: State, boundary: BoundaryConditions) -> State:
-        """One frame."""
         after = begin_frame(state, boundary)
         assert isinstance(after.rows, PointRows)  # other bodies are refused
         implicit, rows = after.memory.at(after.model, after.rows, boundary.dt, boundary.damping)

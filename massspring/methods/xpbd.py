@@ -115,7 +115,6 @@ class Xpbd(Method):
         return start(body, attachments, v, cells_of(body))
 
     def advance(self, state: State, boundary: BoundaryConditions) -> State:
-        """One frame."""
         after, cells = begin_frame(state, boundary), own_cells(state)
         # The forces of the last step are used to find contacts; a copy leaves those of the old state unchanged.
         cells = cells._replace(push=cells.push.copy())

@@ -2,17 +2,11 @@
 8.7)."""
 
 import math
-from typing import Any
-
-from llvmlite import ir
-from numba import types
-from numba.core import cgutils
-from numba.extending import intrinsic, overload
 
 from massspring.kernels.arrays.volume_rows import SIZE
-from massspring.kernels.jit.decorators import njit_exposed
-from massspring.kernels.jit.row_sums import INLINED
-from massspring.kernels.jit.simd4 import plus, spread_over
+from massspring.kernels.jit.decorators import njit_exposed, njit_inlined
+from massspring.kernels.jit.flat import flat
+from massspring.kernels.jit.vectors import add_product, lanes_of, load, save, spread
 
 
 @njit_exposed
@@ -24,36 +18,16 @@ def scale_into(clusters, diagonal):
         clusters.scale[k] = 1.0 / math.sqrt(own) if own > 0.0 else 0.0
 
 
+@njit_inlined
 def answer(inverse, first, part):
-    """part[1] = inverse · part[0] for the cluster that begins at row `first`; the inverse is symmetric."""
-    part[1] = part[0] @ inverse[first : first + SIZE]
-
-
-@intrinsic
-def _answer(typingctx: Any, inverse: Any, first: Any, part: Any) -> Any:
-    """The product column by column, with all sums of the cluster in vector registers."""
-
-    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        numbers = ir.VectorType(ir.FloatType(), SIZE)
-        index, width = ir.IntType(64), ir.Constant(ir.IntType(64), SIZE)
-        columns, both = (context.make_array(signature.args[at])(context, builder, args[at]).data for at in (0, 2))
-        total = cgutils.alloca_once_value(builder, ir.Constant(numbers, [0.0] * SIZE))
-        with cgutils.for_range(builder, width) as loop:
-            share = builder.load(builder.gep(both, [loop.index]))
-            row = builder.mul(builder.add(args[1], loop.index), width)
-            column = builder.load(builder.bitcast(builder.gep(columns, [row]), numbers.as_pointer()), align=4)
-            spread = spread_over(builder, share, numbers)
-            builder.store(plus(builder, builder.load(total), column, spread), total)
-        where = builder.bitcast(builder.gep(both, [ir.Constant(index, SIZE)]), numbers.as_pointer())
-        builder.store(builder.load(total), where, align=4)
-        return context.get_dummy_value()
-
-    return types.void(inverse, types.intp, part), generate
-
-
-@overload(answer, jit_options=INLINED)
-def _compiled_answer(inverse, first, part):
-    return lambda inverse, first, part: _answer(inverse, first, part)  # pyright: ignore[reportCallIssue]
+    """part[1] = inverse · part[0] for the cluster that begins at row `first`; the inverse is symmetric, so that its
+    rows serve as columns."""
+    answers = flat(part, 1, 2)
+    for lane in range(0, SIZE, lanes_of(inverse)):
+        total = spread(0.0, inverse)
+        for k in range(SIZE):
+            total = add_product(total, load(inverse, first + k, lane), spread(part[0, k], inverse))
+        save(total, answers, lane)
 
 
 @njit_exposed

@@ -1,5 +1,5 @@
 # pyright: reportCallIssue=false, reportOptionalCall=false
-"""Vector registers as values: the components of several nodes side by side, with +, −, ×, ÷ lane by lane.
+"""Vector registers as values: numbers of several nodes side by side, or the four of one row; +, −, ×, ÷ lane by lane.
 
 The compiler makes vectors of loops over arrays in memory, not of sums that stay in registers over a loop. The plain
 functions define the results, with NumPy arrays as vectors, and are used when nothing is compiled.
@@ -56,11 +56,51 @@ def at_least(vector: Any, least: Any) -> Any:
     return np.where(vector < least, least, vector)
 
 
-class Vector(types.Type):
-    """The numbers of one register."""
+def add_product(total: Any, a: Any, b: Any) -> Any:
+    """total + a b, rounded once where the machine can."""
+    return total + a * b
 
-    def __init__(self, real: Any) -> None:
-        self.real, self.count = real, 8 * BYTES // real.bitwidth
+
+def four(padded: np.ndarray, row: int) -> Any:
+    """The numbers of a row; `padded` (n, 4)."""
+    return padded[row].copy()
+
+
+def put_four(vector: Any, padded: np.ndarray, row: int) -> None:
+    """Stores them."""
+    padded[row] = vector
+
+
+def spread_four(number: Any, like: Any) -> Any:
+    """One number in four lanes, in the precision of `like`, a table or a vector."""
+    return np.full(4, number, dtype=like.dtype)
+
+
+def doubled(vector: Any) -> Any:
+    """Four numbers in double precision."""
+    return vector.astype(np.float64)
+
+
+def turned(vector: Any) -> Any:
+    """(y, z, x, 0) of (x, y, z, 0)."""
+    return vector[[1, 2, 0, 3]]
+
+
+def unless(condition: bool, vector: Any) -> Any:
+    """The vector, or zeros if `condition`; both are computed, so that there is no branch."""
+    return np.zeros_like(vector) if condition else vector
+
+
+def across(vector: Any) -> float:
+    """The sum of four lanes."""
+    return (vector[0] + vector[1]) + (vector[2] + vector[3])
+
+
+class Vector(types.Type):
+    """The numbers of one register, or `count` of them."""
+
+    def __init__(self, real: Any, count: int = 0) -> None:
+        self.real, self.count = real, count or 8 * BYTES // real.bitwidth
         super().__init__(name=f"vector({real} x {self.count})")
 
 
@@ -68,6 +108,12 @@ class Vector(types.Type):
 class _VectorModel(models.PrimitiveModel):
     def __init__(self, manager: Any, kind: Any) -> None:
         super().__init__(manager, kind, ir.VectorType(manager.lookup(kind.real).get_value_type(), kind.count))
+
+
+def _generates(function: Callable[..., Any], result: Callable[..., Any], *kinds: Any) -> Callable[..., Any]:
+    """Decorates the code generator of a function; `result` gives the type of its value from those of its arguments."""
+    type_callable(function)(lambda context: result)
+    return lower_builtin(function, *kinds)
 
 
 def _operation(function: Callable[..., Any], instruction: str) -> None:
@@ -95,22 +141,19 @@ for _function, _instruction in (
     _operation(_function, _instruction)
 
 
-@type_callable(lanes_of)
-def _type_of_lanes(context: Any) -> Any:
-    return lambda table: types.intp
-
-
-@lower_builtin(lanes_of, types.Array)
+@_generates(lanes_of, lambda table: types.intp, types.Array)
 def _lanes(context: Any, builder: Any, signature: Any, args: Any) -> Any:
     return context.get_constant(types.intp, 8 * BYTES // signature.args[0].dtype.bitwidth)
 
 
-@type_callable(spread)
-def _type_of_spread(context: Any) -> Any:
-    return lambda number, table: Vector(table.dtype)
-
-
-@lower_builtin(spread, types.Number, types.Array)
+@lower_builtin(spread_four, types.Number, Vector)
+@_generates(
+    spread_four,
+    lambda number, like: Vector(like.real if isinstance(like, Vector) else like.dtype, 4),
+    types.Number,
+    types.Array,
+)
+@_generates(spread, lambda number, table: Vector(table.dtype), types.Number, types.Array)
 def _spread(context: Any, builder: Any, signature: Any, args: Any) -> Any:
     kind = signature.return_type
     number = context.cast(builder, args[0], signature.args[0], kind.real)
@@ -138,12 +181,7 @@ def _bytes(kind: Any) -> int:
     return kind.dtype.bitwidth // 8
 
 
-@type_callable(load)
-def _type_of_load(context: Any) -> Any:
-    return lambda table, row, column: Vector(table.dtype)
-
-
-@lower_builtin(load, types.Array, types.Integer, types.Integer)
+@_generates(load, lambda table, row, column: Vector(table.dtype), types.Array, types.Integer, types.Integer)
 def _load(context: Any, builder: Any, signature: Any, args: Any) -> Any:
     kinds = signature.args
     pointer = _address(context, builder, kinds[0], args[0], [(args[1], kinds[1]), (args[2], kinds[2])])
@@ -151,12 +189,7 @@ def _load(context: Any, builder: Any, signature: Any, args: Any) -> Any:
     return builder.load(builder.bitcast(pointer, vector.as_pointer()), align=_bytes(kinds[0]))
 
 
-@type_callable(save)
-def _type_of_save(context: Any) -> Any:
-    return lambda vector, table, at: types.void
-
-
-@lower_builtin(save, Vector, types.Array, types.Integer)
+@_generates(save, lambda vector, table, at: types.void, Vector, types.Array, types.Integer)
 def _save(context: Any, builder: Any, signature: Any, args: Any) -> Any:
     kinds = signature.args
     pointer = _address(context, builder, kinds[1], args[1], [(args[2], kinds[2])])
@@ -164,12 +197,14 @@ def _save(context: Any, builder: Any, signature: Any, args: Any) -> Any:
     return context.get_dummy_value()
 
 
-@type_callable(gather)
-def _type_of_gather(context: Any) -> Any:
-    return lambda padded, nodes, row, column: types.UniTuple(Vector(padded.dtype), 3)
-
-
-@lower_builtin(gather, types.Array, types.Array, types.Integer, types.Integer)
+@_generates(
+    gather,
+    lambda padded, nodes, row, column: types.UniTuple(Vector(padded.dtype), 3),
+    types.Array,
+    types.Array,
+    types.Integer,
+    types.Integer,
+)
 def _gather(context: Any, builder: Any, signature: Any, args: Any) -> Any:
     padded, nodes, row_kind, column_kind = signature.args
     first = _address(context, builder, nodes, args[1], [(args[2], row_kind), (args[3], column_kind)])
@@ -227,24 +262,68 @@ def _turned_single(builder: Any, rows: list[Any]) -> list[Any]:
     return [picked(*even, 0, 2), picked(*odd, 0, 2), picked(*even, 1, 3)]
 
 
-@type_callable(root)
-def _type_of_root(context: Any) -> Any:
-    return lambda vector: vector
-
-
-@lower_builtin(root, Vector)
+@_generates(root, lambda vector: vector, Vector)
 def _root(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-    vector = args[0].type
-    name = f"llvm.sqrt.v{vector.count}{vector.element.intrinsic_name}"
-    function = cgutils.get_or_insert_function(builder.module, ir.FunctionType(vector, [vector]), name)
-    return builder.call(function, args)
+    return _called(builder, "sqrt", *args)
 
 
-@type_callable(at_least)
-def _type_of_at_least(context: Any) -> Any:
-    return lambda vector, least: vector
+def _called(builder: Any, name: str, *vectors: Any) -> Any:
+    """The result of an LLVM function of vectors of one type."""
+    kind = vectors[0].type
+    name = f"llvm.{name}.v{kind.count}{kind.element.intrinsic_name}"
+    function = cgutils.get_or_insert_function(builder.module, ir.FunctionType(kind, [kind] * len(vectors)), name)
+    return builder.call(function, vectors)
 
 
-@lower_builtin(at_least, Vector, Vector)
+@_generates(at_least, lambda vector, least: vector, Vector, Vector)
 def _at_least(context: Any, builder: Any, signature: Any, args: Any) -> Any:
     return builder.select(builder.fcmp_ordered("<", *args), args[1], args[0])
+
+
+@_generates(add_product, lambda total, a, b: total, Vector, Vector, Vector)
+def _add_product(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+    return _called(builder, "fmuladd", args[1], args[2], args[0])
+
+
+@_generates(four, lambda padded, row: Vector(padded.dtype, 4), types.Array, types.Integer)
+def _four(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+    pointer = _row_of_four(context, builder, signature.args, args)
+    return builder.load(pointer, align=_bytes(signature.args[0]))
+
+
+def _row_of_four(context: Any, builder: Any, kinds: Any, args: Any) -> Any:
+    """Pointer to a row of a table (n, 4)."""
+    base, word = context.make_array(kinds[0])(context, builder, args[0]).data, context.get_value_type(types.intp)
+    row = context.cast(builder, args[1], kinds[1], types.intp)
+    return builder.bitcast(
+        builder.gep(base, [builder.mul(row, word(4))]), ir.VectorType(base.type.pointee, 4).as_pointer()
+    )
+
+
+@_generates(put_four, lambda vector, padded, row: types.void, Vector, types.Array, types.Integer)
+def _put_four(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+    pointer = _row_of_four(context, builder, signature.args[1:], args[1:])
+    builder.store(args[0], pointer, align=_bytes(signature.args[1]))
+    return context.get_dummy_value()
+
+
+@_generates(doubled, lambda vector: Vector(types.float64, vector.count), Vector)
+def _doubled(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+    double = context.get_value_type(signature.return_type)
+    return args[0] if args[0].type == double else builder.fpext(args[0], double)
+
+
+@_generates(turned, lambda vector: vector, Vector)
+def _turned(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+    return _shuffled(builder, args[0], ir.Constant(args[0].type, ir.Undefined), [1, 2, 0, 3])
+
+
+@_generates(unless, lambda condition, vector: vector, types.Boolean, Vector)
+def _unless(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+    return builder.select(args[0], ir.Constant(args[1].type, [0.0] * args[1].type.count), args[1])
+
+
+@_generates(across, lambda vector: vector.real, Vector)
+def _across(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+    a, b, c, d = (builder.extract_element(args[0], ir.IntType(32)(lane)) for lane in range(4))
+    return builder.fadd(builder.fadd(a, b), builder.fadd(c, d))

@@ -45,5 +45,4 @@ class Baumgarte(Method):
         return self.beta**2 + 4.0 * self.alpha < 4.0 and 2.0 * self.alpha < 2.0
 
     def advance(self, state: State, boundary: BoundaryConditions) -> State:
-        """One frame."""
         return advance_by(Rule(self.beta * self.beta, 2.0 * self.alpha, True), state, boundary)

@@ -32,5 +32,4 @@ class PostStabilization(Method):
     )
 
     def advance(self, state: State, boundary: BoundaryConditions) -> State:
-        """One frame."""
         return advance_by(Rule(pull=0.0, stabilised=True), state, boundary)

@@ -30,5 +30,4 @@ class Projection(Method):
     capabilities: ClassVar[Capabilities] = Capabilities("whole", "full", thin_probes=True)
 
     def advance(self, state: State, boundary: BoundaryConditions) -> State:
-        """One frame."""
         return advance_by(Rule(exact=True, at_prediction=True), state, boundary)

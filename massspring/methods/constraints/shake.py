@@ -25,5 +25,4 @@ class Shake(Method):
     capabilities: ClassVar[Capabilities] = Capabilities("whole", "full", thin_probes=True)
 
     def advance(self, state: State, boundary: BoundaryConditions) -> State:
-        """One frame."""
         return advance_by(Rule(exact=True), state, boundary)

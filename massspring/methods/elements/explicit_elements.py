@@ -156,7 +156,6 @@ class ExplicitElements(Method):
         object.__setattr__(self, "capabilities", supported(self.capabilities, self.name, self.law))
 
     def why_not(self, body: Body) -> str | None:
-        """Why the method cannot advance `body`; None when it can."""
         reason = self.capabilities.why_not(body)
         return why_not_corotated(body) if reason is None and self.law == "corotated" else reason
 
@@ -181,7 +180,6 @@ class ExplicitElements(Method):
         return start(body, attachments, v, memory=memory)
 
     def advance(self, state: State, boundary: BoundaryConditions) -> State:
-        """One frame."""
         after = begin_frame(state, boundary)
         assert after.rows is not None  # bodies with a single volume are refused
         if isinstance(after.memory, Corotated):

@@ -74,7 +74,6 @@ class ImplicitElements(Method):
             raise MassSpringError(f"{self.name}'s most_passes is {self.most_passes}; it needs at least one")
 
     def why_not(self, body: Body) -> str | None:
-        """Why the method cannot advance `body`; None when it can."""
         reason = self.capabilities.why_not(body)
         if reason is None and self.law == "corotated":
             reason = why_not_corotated(body)
@@ -94,7 +93,6 @@ class ImplicitElements(Method):
         )
 
     def advance(self, state: State, boundary: BoundaryConditions) -> State:
-        """One frame."""
         after = begin_frame(state, boundary)
         end_stage(after.diagnostics.stage_times, BETWEEN_FRAMES)
         prepared: Prepared = after.memory

@@ -110,7 +110,6 @@ class XpbdNeoHookean(Method):
             raise MassSpringError(f"{self.name}'s iterations are {self.iterations}; it needs at least one")
 
     def why_not(self, body: Body) -> str | None:
-        """Why the method cannot advance `body`; None when it can."""
         reason = self.capabilities.why_not(body)
         if reason is None and not has_nodal_volumes(body):
             return "it keeps nodal volumes only; take explicit_elements"
@@ -127,7 +126,6 @@ class XpbdNeoHookean(Method):
         return replace(state, model=model._replace(slices=slices))
 
     def advance(self, state: State, boundary: BoundaryConditions) -> State:
-        """One frame."""
         after, memory = begin_frame(state, boundary), state.memory
         # The forces of the last step are used to find contacts; a copy leaves those of the old state unchanged.
         push, body = memory.push.copy(), memory.body

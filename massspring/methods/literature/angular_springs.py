@@ -119,7 +119,6 @@ class AngularSprings(Method):
             raise MassSpringError(f"{self.name}'s ratio is {self.ratio}; it must be positive and finite")
 
     def why_not_among(self, surroundings: Surroundings) -> str | None:
-        """Why the method cannot run in such surroundings; None when it can."""
         return "it keeps no volume that could be filled" if surroundings.targets else None
 
     def added_stiffness(self, body: Body) -> csr_array:
@@ -136,7 +135,6 @@ class AngularSprings(Method):
         return start(body, attachments, v, memory=angles_of(body, self.ratio))
 
     def advance(self, state: State, boundary: BoundaryConditions) -> State:
-        """One frame."""
         after = begin_frame(state, boundary)
         angular_frame(after.frame(boundary), after.memory, np.empty_like(after.nodes.x))
         return after

@@ -96,7 +96,6 @@ class ChainMail(Method):
             raise MassSpringError(f"{self.name}'s sweeps is {self.sweeps}; it cannot be negative")
 
     def why_not_among(self, surroundings: Surroundings) -> str | None:
-        """Why the method cannot run in such surroundings; None when it can."""
         if any(surroundings.gravity):
             return "it has no masses, so gravity has no effect"
         if surroundings.moved:

@@ -66,11 +66,9 @@ class ElasticResponse(Method):
         check_ratio(self.name, "bulk_ratio", self.bulk_ratio)
 
     def why_not(self, body: Body) -> str | None:
-        """Why the method cannot advance `body`; None when it can."""
         return why_not_linear(body)
 
     def why_not_among(self, surroundings: Surroundings) -> str | None:
-        """Why the method cannot run in such surroundings; None when it can."""
         if surroundings.moved:
             return "it has no inertia, so that nothing moves by itself; take linear_modes"
         return why_not_among(surroundings)
@@ -89,7 +87,6 @@ class ElasticResponse(Method):
         return replace(state, memory=precomputed(held, state.model))
 
     def advance(self, state: State, boundary: BoundaryConditions) -> State:
-        """One frame."""
         after = begin_frame(state, boundary)
         memory: Precomputed = after.memory
         held, nodes, diagnostics = memory.held, after.nodes, after.diagnostics
@@ -142,12 +139,10 @@ class Columns:
         self._rows = np.empty((0, 0, 3))
 
     def compliance(self, rows: TouchedRows) -> np.ndarray:
-        """How far row b moves along its direction by 1 N along row a [m/N], symmetric, (c, c)."""
         memory = self._memory
         columns = memory.columns[memory.place[rows.nodes]]
         self._rows = np.einsum("ri,rij->rj", rows.direction, columns).reshape(len(columns), *memory.held.rest.shape)
         return np.einsum("abi,bi->ab", self._rows[:, rows.nodes], rows.direction)
 
     def moved(self, rows: TouchedRows, pushes: np.ndarray) -> np.ndarray:
-        """Displacement by `pushes` (c,) [N] along the rows of the last `compliance` [m], (n, 3)."""
         return np.tensordot(pushes, self._rows, 1)

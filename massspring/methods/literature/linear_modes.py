@@ -71,11 +71,9 @@ class LinearModes(Method):
             raise MassSpringError(f"{self.name}'s modes is {self.modes}; it needs at least one")
 
     def why_not(self, body: Body) -> str | None:
-        """Why the method cannot advance `body`; None when it can."""
         return why_not_linear(body)
 
     def why_not_among(self, surroundings: Surroundings) -> str | None:
-        """Why the method cannot run in such surroundings; None when it can."""
         return why_not_among(surroundings)
 
     def start(self, body: Body, attachments: tuple[Attachment, ...] = (), v: np.ndarray | None = None) -> State:
@@ -85,7 +83,6 @@ class LinearModes(Method):
         return replace(state, memory=modes_of(held, self.modes))
 
     def advance(self, state: State, boundary: BoundaryConditions) -> State:
-        """One frame."""
         after = begin_frame(state, boundary)
         motion = Motion(after, boundary)
         for step in range(len(boundary.position)):
@@ -212,13 +209,11 @@ class ModalResponse:
         self._loads = np.zeros((0, len(speeds)))
 
     def compliance(self, rows: TouchedRows) -> np.ndarray:
-        """How far row b moves along its direction by 1 N along row a [m/N], symmetric, (c, c)."""
         shape = self._modes.shape.reshape(-1, 3, len(self._speeds))
         self._loads = np.einsum("ri,rik->rk", rows.direction, shape[rows.nodes])
         return (self._dt * self._speeds * self._loads) @ self._loads.T
 
     def moved(self, rows: TouchedRows, pushes: np.ndarray) -> np.ndarray:
-        """Displacement by `pushes` (c,) [N] along the rows of the last `compliance` [m], (n, 3)."""
         return (self._modes.shape @ (self._dt * self.speed(pushes))).reshape(-1, 3)
 
     def speed(self, pushes: np.ndarray) -> np.ndarray:

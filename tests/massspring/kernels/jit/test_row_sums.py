@@ -1,4 +1,4 @@
-"""Sums four numbers at a time equal the plain ones."""
+"""Sums four numbers at a time equal those of NumPy."""
 
 import numpy as np
 import pytest
@@ -13,27 +13,25 @@ MANY = 1e-14
 
 @compiled
 def scaled_sums(starts, index, value, factor, out):
-    """What the plain function does, compiled."""
     for r in range(starts.shape[0] - 1):
         sum_of_scaled(starts[r], starts[r + 1], index, value, factor, 2.5, out, r)
 
 
 @compiled
 def sums_of_products(starts, index, value, field, out):
-    """What the plain function does, compiled."""
     for r in range(starts.shape[0] - 1):
         out[r] = sum_of_products(starts[r], starts[r + 1], index, value, field)
 
 
 @pytest.mark.parametrize("real", [np.float64, np.float32])
-def test_sums_in_registers_equal_the_plain_ones(real):
+def test_sums_in_registers(real):
     """Rows of 0 to 6 entries, the last one up to the end of the arrays."""
     random = np.random.default_rng(1)
     starts = np.concatenate([[0], np.cumsum([3, 0, 6, 1, 4])]).astype(np.uint32)
     index = random.integers(0, 9, starts[-1]).astype(np.uint32)
     value, field = (random.normal(size=(size, 4)).astype(real) for size in (len(index), 9))
     factor = random.normal(size=9)
-    out, plain = np.ones((5, 4), dtype=real), np.ones((5, 4), dtype=real)
+    out = np.ones((5, 4), dtype=real)
     sums = np.ones(5)
     scaled_sums(starts, index, value, factor, out)
     sums_of_products(starts, index, value, field, sums)
@@ -41,15 +39,10 @@ def test_sums_in_registers_equal_the_plain_ones(real):
     matrix = csr_array((np.ones(len(index)), np.arange(len(index)), starts), shape=(5, len(index)))
     assert np.abs(out - 2.5 * matrix @ (factor[index, None] * value)).max() < round_off
     assert np.abs(sums - matrix @ (field[index] * value).sum(axis=1)).max() < round_off
-    for r in range(5):
-        sum_of_scaled(starts[r], starts[r + 1], index, value, factor, 2.5, plain, r)
-        assert sum_of_products(starts[r], starts[r + 1], index, value, field) == pytest.approx(sums[r], abs=round_off)
-    assert np.abs(out - plain).max() < round_off
 
 
 @compiled
 def sums_seen_from_the_first(starts, index, value, padded, weight, out):
-    """What the plain function does, compiled."""
     for r in range(starts.shape[0] - 1):
         if starts[r] < starts[r + 1]:
             out[r] = sums_from_origin(starts[r], starts[r + 1], index, value, padded, weight)
@@ -57,14 +50,14 @@ def sums_seen_from_the_first(starts, index, value, padded, weight, out):
 
 @compiled
 def sums_of_areas(starts, corner, share, padded, out):
-    """What the plain functions do, compiled: each sum, and −3 times it further down."""
+    """Each sum, and −3 times it further down."""
     for r in range(starts.shape[0] - 1):
         sum_of_areas(starts[r], starts[r + 1], corner, share, padded, out, r)
         copy_scaled(-3.0, out, r, out, r + 5)
 
 
 @pytest.mark.parametrize("real", [np.float64, np.float32])
-def test_what_a_row_says_of_a_volume_equals_the_plain_sums(real):
+def test_what_a_row_says_of_a_volume(real):
     """In double whatever the arrays are, and 1e4 from the origin: differences of such places are exact."""
     random = np.random.default_rng(1)
     starts = np.concatenate([[0], np.cumsum([3, 0, 6, 1, 4])]).astype(np.uint32)
@@ -78,25 +71,21 @@ def test_what_a_row_says_of_a_volume_equals_the_plain_sums(real):
         away = padded[index[e]].astype(np.float64) - padded[index[e[0]]]
         squares = (value[e].astype(np.float64) ** 2).sum(axis=1)
         exact = (away * value[e]).sum(), (weight[index[e]] * squares).sum()
-        plain = sums_from_origin(starts[r], starts[r + 1], index, value, padded, weight)
-        assert np.abs(out[r] - exact).max() < 100 * MANY and np.abs(np.subtract(plain, exact)).max() < 100 * MANY
+        assert np.abs(out[r] - exact).max() < 100 * MANY
 
 
 @pytest.mark.parametrize("real", [np.float64, np.float32])
-def test_sums_of_areas_equal_the_plain_ones(real):
-    """Rows of 0 to 6 quadrangles; what is written further down is −3 times each."""
+def test_sums_of_the_areas_of_quadrangles(real):
+    """Rows of 0 to 6 quadrangles."""
     random = np.random.default_rng(1)
     starts = np.concatenate([[0], np.cumsum([3, 0, 6, 1, 4])]).astype(np.uint32)
     corner = random.integers(0, 9, (starts[-1], 4)).astype(np.uint32)
     share, padded = random.normal(size=len(corner)).astype(real), np.zeros((9, 4), dtype=real)
     padded[:, :3] = random.normal(size=(9, 3))
-    out, plain = np.ones((10, 4), dtype=real), np.ones((10, 4), dtype=real)
+    out = np.ones((10, 4), dtype=real)
     sums_of_areas(starts, corner, share, padded, out)
-    for r in range(5):
-        sum_of_areas(starts[r], starts[r + 1], corner, share, padded, plain, r)
-        copy_scaled(-3.0, plain, r, plain, r + 5)
-    assert np.abs(out - plain).max() < 100 * float(np.finfo(real).eps)
-    x = padded[corner[9], :3].astype(np.float64)
-    assert starts[3] == 9  # the row of a single quadrangle
-    assert np.abs(out[3, :3] - share[9] * np.cross(x[2] - x[0], x[3] - x[1])).max() < 100 * float(np.finfo(real).eps)
+    x, row = padded[corner, :3].astype(np.float64), np.repeat(np.arange(5), np.diff(starts.astype(int)))
+    exact = np.zeros((5, 3))
+    np.add.at(exact, row, share[:, None] * np.cross(x[:, 2] - x[:, 0], x[:, 3] - x[:, 1]))
+    assert np.abs(out[:, :3] - np.vstack([exact, -3.0 * exact])).max() < 300 * float(np.finfo(real).eps)
     assert (out[:, 3] == 0).all()
