@@ -10,10 +10,9 @@ from massspring.body.springs import Springs, lengths
 from massspring.body.surface import check_finite, check_surface
 from massspring.body.volumes import Volumes, tetrahedron_volumes
 from massspring.errors import MassSpringError
-from massspring.kernels.arrays.spring_layout import Membrane
+from massspring.kernels.arrays.layout import Membrane
 from massspring.kernels.forces.springs import spring_energy, spring_forces_into
-from massspring.kernels.forces.tetrahedra import smallest_ratio
-from massspring.kernels.forces.volume import enclosed_volume, volume_gradient_into
+from massspring.kernels.forces.volume import enclosed_volume, smallest_ratio, volume_gradient_into
 
 SAME_VOLUME = 1e-9
 """Relative difference below which two volumes are equal: both are sums of the same determinants and differ by round-off

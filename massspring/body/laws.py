@@ -12,7 +12,7 @@ from functools import cached_property
 import numpy as np
 
 from massspring.body.springs import EDGES_OF_TETRAHEDRON, lengths, matched_scale, unique_edges
-from massspring.kernels.forces.tetrahedra import tetrahedron_volumes_into
+from massspring.kernels.forces.volume import tetrahedron_volumes_into
 
 YOUNG = 2.5
 """E/mu of a network of central forces, whose Poisson ratio is ¼."""

@@ -6,7 +6,7 @@ from massspring.body.body import Body, Material
 from massspring.body.springs import EDGES_OF_TRIANGLE, SpringKind, Springs, lengths, unique_edges
 from massspring.body.surface import check_surface, checked_indices, checked_points
 from massspring.errors import MassSpringError
-from massspring.kernels.arrays.spring_layout import Membrane
+from massspring.kernels.arrays.layout import Membrane
 
 MEMBRANE_LAWS = ("delingette", "lloyd")
 

@@ -16,7 +16,7 @@ from scipy.sparse.linalg import lsqr
 from massspring.body.partition import FACES_OF_TETRAHEDRON, node_patches, partition, tetrahedron_faces
 from massspring.body.surface import check_surface
 from massspring.errors import MassSpringError
-from massspring.kernels.forces.tetrahedra import tetrahedron_volumes_into
+from massspring.kernels.forces.volume import tetrahedron_volumes_into
 
 DEPENDENT = 1e-8
 """Relative residual below which a volume is a sum of others; independent ones of a mesh leave more than 1e-4."""

@@ -7,7 +7,7 @@ from massspring.body.inside import is_inside, mean_edge, new_pair, surface_dista
 from massspring.kernels.arrays.layout import FrameDiagnostics
 from massspring.kernels.probe.arrays import COUNTS, Probing, Rows
 from massspring.kernels.probe.broad_phase import TRIANGLE_BLOCK
-from massspring.layout.morton import along_curve
+from massspring.layout.sell_chunks import along_curve
 from massspring.world.obstacles import Probe
 
 SKIN = 0.01

@@ -6,9 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from massspring.body.springs import Springs
-from massspring.kernels.arrays.spring_layout import Slices
+from massspring.kernels.arrays.layout import Slices
 from massspring.kernels.fused.chunk import LANES
-from massspring.layout.morton import along_curve
 
 LONGEST, PIECE = 24, 10
 """LONGEST: springs outside its ring up to which a node takes one lane. A node with more is split into pieces of PIECE
@@ -223,3 +222,23 @@ def slices_of(springs: Springs, triangles: np.ndarray, inverse_mass: np.ndarray,
         origin=int(triangles[0, 0]),
         without_length=bool(springs.count and not springs.rest_length.any()),
     )
+
+
+CURVE_BITS = 20  # per axis: a millionth of the body, so that no two nodes share a cell
+
+
+def along_curve(x: np.ndarray) -> np.ndarray:
+    """Position of each point along a space-filling curve, Morton's order, (n,).
+
+    It interleaves the bits of the three coordinates x [m], (n, 3) (Morton 1966).
+    """
+    cells = 1 << CURVE_BITS
+    size = max(float(np.ptp(x, axis=0).max()), np.finfo(float).tiny)
+    cell = np.minimum((x - x.min(axis=0)) / size * cells, cells - 1).astype(np.int64)
+    key = np.zeros(len(x), dtype=np.int64)
+    for bit in range(CURVE_BITS):
+        for axis in range(3):
+            key |= ((cell[:, axis] >> bit) & 1) << (3 * bit + axis)
+    place = np.empty(len(x), dtype=np.int64)
+    place[np.argsort(key, kind="stable")] = np.arange(len(x))
+    return place

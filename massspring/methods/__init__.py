@@ -1,10 +1,6 @@
-"""The methods, each in its file. Adding one: write the file, add a line to METHODS; the contract test does the rest."""
+"""The methods. Adding one: write its class in a file, add a line to METHODS; the contract test does the rest."""
 
 from massspring.methods.barycentre import Barycentre
-from massspring.methods.constraints.baumgarte import Baumgarte
-from massspring.methods.constraints.post_stabilization import PostStabilization
-from massspring.methods.constraints.projection import Projection
-from massspring.methods.constraints.shake import Shake
 from massspring.methods.element import Element
 from massspring.methods.elements.explicit_elements import ExplicitElements
 from massspring.methods.elements.implicit_elements import ImplicitElements
@@ -17,9 +13,8 @@ from massspring.methods.literature.chain_mail import ChainMail
 from massspring.methods.literature.elastic_response import ElasticResponse
 from massspring.methods.literature.linear_modes import LinearModes
 from massspring.methods.method import Method
-from massspring.methods.penalty import Penalty
-from massspring.methods.pressure import Pressure
-from massspring.methods.pyramid import Pyramid
+from massspring.methods.one_volume import Baumgarte, PostStabilization, Projection, Shake
+from massspring.methods.pressures import Penalty, Pressure, Pyramid
 from massspring.methods.semi_implicit import SemiImplicit
 from massspring.methods.xpbd import Xpbd
 

@@ -13,8 +13,7 @@ from massspring.layout.allocate import start
 from massspring.layout.probe_arrays import fresh
 from massspring.layout.state import State, new_diagnostics
 from massspring.methods.capabilities import Capabilities
-from massspring.world.obstacles import Attachment
-from massspring.world.surroundings import Surroundings
+from massspring.world.obstacles import Attachment, Surroundings
 
 
 class Method(Protocol):

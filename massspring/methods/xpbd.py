@@ -26,7 +26,7 @@ from massspring.body.body import Body
 from massspring.errors import MassSpringError
 from massspring.kernels.arrays.layout import BoundaryConditions, Push
 from massspring.kernels.constraint.tetrahedra import relax_cells, relax_sum, relax_whole
-from massspring.kernels.contact.constrained_motion import unpushed_into
+from massspring.kernels.contact.node_contact import unpushed_into
 from massspring.kernels.forces.tetrahedron_volumes import fill, mean_pressure
 from massspring.kernels.jit.decorators import njit_lean
 from massspring.kernels.step.begin import begin_step, multiplier_stands, open_frame, search_contacts

@@ -17,8 +17,7 @@ from massspring.layout.probe_arrays import tip_depth
 from massspring.layout.state import State
 from massspring.methods.capabilities import No
 from massspring.methods.method import Method
-from massspring.world.obstacles import Attachment, Capsule, Obstacle, Plane, Probe, Sphere
-from massspring.world.surroundings import Surroundings
+from massspring.world.obstacles import Attachment, Capsule, Obstacle, Plane, Probe, Sphere, Surroundings
 from massspring.world.trajectories import Ramp
 
 INSIDE = 1e-6

@@ -8,8 +8,7 @@ from scipy.sparse import csr_array
 
 from massspring.body.body import Body
 from massspring.errors import MassSpringError
-from massspring.kernels.forces.membrane import membrane_energy
-from massspring.kernels.forces.springs import spring_energy
+from massspring.kernels.forces.springs import membrane_energy, spring_energy
 from massspring.kernels.probe.arrays import COUNTS
 from massspring.layout.probe_arrays import tip_depth
 from massspring.layout.state import State

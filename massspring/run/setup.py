@@ -30,8 +30,7 @@ from massspring.run.events import Easing, Event, check_event, check_events
 from massspring.run.precision import Precision, check_precision, in_precision
 from massspring.run.renumber import Numbered, numbered
 from massspring.world.clock import Clock
-from massspring.world.obstacles import Attachment, Capsule, Obstacle, Plane, Probe, Sphere
-from massspring.world.surroundings import Surroundings
+from massspring.world.obstacles import Attachment, Capsule, Obstacle, Plane, Probe, Sphere, Surroundings
 from massspring.world.targets import fastest_filling, followed
 from massspring.world.trajectories import Ramp
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from massspring import LITERATURE, METHODS, Method, Plane
 from massspring.methods import VARIANTS
 from massspring.methods.capabilities import No
-from massspring.world.surroundings import Surroundings
+from massspring.world.obstacles import Surroundings
 from studies.base.atomic import write_whole
 
 PAGE = Path("docs/methods.md")

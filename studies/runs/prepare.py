@@ -23,7 +23,7 @@ from massspring import (
 from massspring.body.opening import parents
 from massspring.body.volumes import Volumes
 from massspring.methods.capabilities import No
-from massspring.world.surroundings import Surroundings
+from massspring.world.obstacles import Surroundings
 from studies.base.errors import DoesNotApply, StudyError
 from studies.geometry import OrganMesh
 from studies.geometry.mesh.organ_mesh import triangle_areas

@@ -3,7 +3,7 @@
 import numpy as np
 
 from massspring.kernels.arrays.layout import Contacts
-from massspring.kernels.contact.modes import SLIDES
+from massspring.kernels.contact.node_contact import SLIDES
 
 
 def list_active(contacts: Contacts) -> None:

@@ -1,6 +1,6 @@
 """One pass of springs and volume from given positions, for tests: in a step the positions are padded already."""
 
-from massspring.kernels.fused.padded import pad_positions
+from massspring.kernels.fused.chunk import pad_positions
 from massspring.kernels.fused.sweep import predict_from_places
 from massspring.kernels.jit.decorators import njit_lean
 

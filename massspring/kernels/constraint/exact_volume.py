@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from massspring.kernels.contact.constrained_motion import pushed_by_into, unpushed_into
+from massspring.kernels.contact.node_contact import pushed_by_into, unpushed_into
 from massspring.kernels.jit.decorators import compiled
 from massspring.kernels.jit.vec3 import minus, row, triple
 

@@ -2,8 +2,7 @@
 
 import math
 
-from massspring.kernels.contact.constrained_motion import after_contact, allowed
-from massspring.kernels.contact.modes import FREE
+from massspring.kernels.contact.node_contact import FREE, after_contact, allowed
 from massspring.kernels.jit.decorators import compiled, njit_lean
 from massspring.kernels.jit.row_sums import copy_scaled, sum_of_areas, sum_of_products, sum_of_scaled, sums_from_origin
 from massspring.kernels.jit.vec3 import dot, minus, plus, put, row, times

@@ -2,7 +2,7 @@
 
 import math
 
-from massspring.kernels.contact.constrained_motion import moved_by
+from massspring.kernels.contact.node_contact import moved_by
 from massspring.kernels.forces.elements import cofactors, deformation, matrix_times
 from massspring.kernels.jit.decorators import compiled, njit_inlined
 from massspring.kernels.jit.vec3 import add_to, dot, plus, row, times

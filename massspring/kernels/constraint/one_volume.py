@@ -2,9 +2,7 @@
 
 import math
 
-from massspring.kernels.contact.constrained_motion import allowed
-from massspring.kernels.contact.modes import FREE
-from massspring.kernels.contact.node_contact import taken_share
+from massspring.kernels.contact.node_contact import FREE, allowed, taken_share
 from massspring.kernels.jit.decorators import njit_exposed, njit_inlined, njit_lean
 from massspring.kernels.jit.vec3 import dot, row
 

@@ -4,8 +4,8 @@ import math
 
 from massspring.kernels.constraint.block_jacobi import precondition_into, scale_into
 from massspring.kernels.constraint.jacobian import NEGLIGIBLE_DIAGONAL, mobilised_into, padded_rows_times_into
-from massspring.kernels.contact.constrained_motion import allowed
 from massspring.kernels.contact.face_pairs import part_faces
+from massspring.kernels.contact.node_contact import allowed
 from massspring.kernels.jit.decorators import compiled, njit_inlined, njit_lean, njit_reassociated
 from massspring.kernels.jit.vec3 import dot, row, times
 

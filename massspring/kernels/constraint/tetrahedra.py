@@ -1,7 +1,7 @@
 """The volumes of all tetrahedra solved for at the end of a step: together, or one after the other (eq. 10.13,
 10.14)."""
 
-from massspring.kernels.contact.constrained_motion import moved_by, pushed_by_into, unpushed_into
+from massspring.kernels.contact.node_contact import moved_by, pushed_by_into, unpushed_into
 from massspring.kernels.forces.tetrahedron_volumes import add_four, cell_slopes, four, mean_pressure
 from massspring.kernels.forces.volume import volume_gradient_into
 from massspring.kernels.jit.decorators import compiled

@@ -7,10 +7,9 @@ import math
 
 from massspring.kernels.contact.friction import activate_edges, apply_friction, release_edges, release_slipping
 from massspring.kernels.contact.gaps import gap_and_normal, predicted_gaps_into, pushed_velocity
-from massspring.kernels.contact.modes import FREE, ON_EDGE, SLIDES
-from massspring.kernels.contact.node_contact import round_contact
-from massspring.kernels.jit.blocks import BLOCK, any_gap_within
+from massspring.kernels.contact.node_contact import FREE, ON_EDGE, SLIDES, round_contact
 from massspring.kernels.jit.decorators import njit_exposed, njit_inlined, njit_lean
+from massspring.kernels.jit.flat import BLOCK, any_gap_within
 from massspring.kernels.jit.vec3 import dot, minus, plus, put, row, times
 
 CONTACT_PASSES = 3

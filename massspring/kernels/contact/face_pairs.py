@@ -6,7 +6,7 @@ node is in two pairs, so a division eliminates each pair, and the volumes see on
 
 import math
 
-from massspring.kernels.contact.constrained_motion import after_contact, allowed
+from massspring.kernels.contact.node_contact import after_contact, allowed
 from massspring.kernels.jit.decorators import compiled, njit_inlined, njit_lean
 from massspring.kernels.jit.vec3 import add_to, cross, dot, minus, over, plus, put, row, take_from, times
 

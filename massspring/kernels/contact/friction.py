@@ -1,12 +1,12 @@
-"""Contact with friction, and of a node with two obstacles at once (docs/theory.md, section 9)."""
+"""Contact with friction, and of a node with two obstacles at once; impulses of the obstacles (docs/theory.md, section
+9)."""
 
 import math
 
 from massspring.kernels.contact.gaps import gap_and_normal, pushed_velocity
-from massspring.kernels.contact.modes import FREE, ON_EDGE, SLIDES, STICKS
-from massspring.kernels.contact.node_contact import allowed_part
+from massspring.kernels.contact.node_contact import FREE, ON_EDGE, SLIDES, STICKS, allowed_part, settled
 from massspring.kernels.jit.decorators import njit_inlined, njit_lean
-from massspring.kernels.jit.vec3 import cross, dot, minus, over, plus, put, row, times
+from massspring.kernels.jit.vec3 import add_to, cross, dot, minus, over, plus, put, row, take_from, times
 
 SLIPS = 1.0 + 1e-9
 """Factor on the friction limit, so that round-off does not make a sticking node slip."""
@@ -119,3 +119,24 @@ def release_edges(model, nodes, contacts, boundary, push):
             contacts.contact_id[i], contacts.mode[i], contacts.predicted_gap[i] = 0, FREE, 0.0
             changes += 1
     return changes
+
+
+@njit_inlined
+def book_contacts(model, nodes, contacts, push, dt, contact_impulse):
+    """Adds the impulse of each obstacle, m (v⁺ − u) [N s] (eq. 3.5); u is the velocity without contact."""
+    mode, real = contacts.mode, nodes.x.dtype.type
+    impulse = real(dt * push.factor)
+    for k in range(contacts.active_count[0]):
+        i = contacts.active[k]
+        if mode[i] == FREE:
+            continue
+        w = impulse * real(model.inverse_mass[i])
+        u = plus(row(nodes.v_star, i), times(w, row(push.direction, i)))
+        o, gained = contacts.contact_id[i] - 1, times(model.mass[i], minus(settled(contacts, i, u), u))
+        add_to(contact_impulse, o, gained)
+        if mode[i] == ON_EDGE:
+            # Both obstacles of an edge push: the part along the second normal is the second's.
+            m = row(contacts.second_normal, i)
+            _, beta = impulse_shares(gained, row(contacts.normal, i), m)
+            take_from(contact_impulse, o, times(beta, m))
+            add_to(contact_impulse, contacts.second[i] - 1, times(beta, m))

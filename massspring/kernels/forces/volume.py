@@ -1,4 +1,4 @@
-"""The volume inside a closed surface and its gradient."""
+"""Volumes inside closed surfaces and of tetrahedra, and their gradients."""
 
 from massspring.kernels.jit.decorators import compiled, njit_inlined
 from massspring.kernels.jit.vec3 import add_to, cross, dot, minus, over, plus, row, times, triple
@@ -52,3 +52,28 @@ def cone_volume(x, triangles, o):
         a, b, c = row(x, triangles[f, 0]), row(x, triangles[f, 1]), row(x, triangles[f, 2])
         six += triple(minus(a, o), minus(b, o), minus(c, o))
     return six / 6.0
+
+
+@compiled
+def tetrahedron_volumes_into(x, tetrahedra, volume):
+    """V_t = (1/6) (x_b − x_a) · ((x_c − x_a) × (x_d − x_a)) [m³], (k,) (eq. 2.3). Negative: inverted."""
+    for t in range(tetrahedra.shape[0]):
+        o = row(x, tetrahedra[t, 0])
+        b, c, d = (
+            minus(row(x, tetrahedra[t, 1]), o),
+            minus(row(x, tetrahedra[t, 2]), o),
+            minus(row(x, tetrahedra[t, 3]), o),
+        )
+        volume[t] = triple(b, c, d) / 6.0
+
+
+@compiled
+def smallest_ratio(volume, rest_volume):
+    """min_t V_t / V_t0 [1], the smallest J of linear tetrahedra (eq. 2.3); NaN where one is not a number."""
+    smallest = volume[0] / rest_volume[0]
+    for t in range(volume.shape[0]):
+        ratio = volume[t] / rest_volume[t]
+        if ratio != ratio:
+            return ratio
+        smallest = min(smallest, ratio)
+    return smallest

@@ -51,3 +51,13 @@ def put_slice(tile, block, slices, s, x):
     for lane in range(slices.lanes[s]):
         i, at = node[s, lane], THERE + 3 * lane
         x[i, 0], x[i, 1], x[i, 2] = tile[at], tile[at + 1], tile[at + 2]
+
+
+@njit_inlined
+def pad_positions(nodes, work, first, last):
+    """Copies the positions of nodes first ≤ i < last to `padded_positions`, (n, 4), so that one load fetches a node."""
+    x, padded = flat(nodes.x, first, last), flat(work.padded_positions, first, last)
+    zero = nodes.x.dtype.type(0)
+    for i in range(last - first):
+        padded[4 * i], padded[4 * i + 1] = x[3 * i], x[3 * i + 1]
+        padded[4 * i + 2], padded[4 * i + 3] = x[3 * i + 2], zero

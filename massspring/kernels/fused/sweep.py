@@ -4,10 +4,9 @@ Each spring is computed at both of its ends, so that no result is scattered and 
 same work.
 """
 
-from massspring.kernels.forces.springs import SHORTEST
+from massspring.kernels.forces.springs import SHORTEST, add_membrane_forces
 from massspring.kernels.fused.chunk import AREA, FORCE, HERE, LANES, RESULT, SHARE, SPEED, SUMS, put_slice, take, total
-from massspring.kernels.fused.long_rows import add_walls, join_pieces
-from massspring.kernels.jit.decorators import njit_inlined
+from massspring.kernels.jit.decorators import njit_inlined, njit_lean
 from massspring.kernels.jit.vec3 import cross, dot, minus, plus, times
 from massspring.kernels.jit.vectors import at_least, gather, lanes_of, load, root, save, spread
 
@@ -186,3 +185,48 @@ def add_up(sums, pieces):
             flow += sums[s, 1]
             mobility += sums[s, 2]
     return volume / 18.0, flow, mobility
+
+
+@njit_lean
+def join_pieces(model, nodes, work, boundary, keeps):
+    """v* and G of the nodes in pieces; their contributions to G·v* and G·W·G go into the last row of `sums`."""
+    slices = model.slices
+    keep = 1.0 - boundary.damping * boundary.dt
+    flow, mobility = 0.0, 0.0
+    for k in range(slices.split_node.shape[0]):
+        i = slices.split_node[k]
+        w = model.inverse_mass[i]
+        for axis in range(3):
+            force, area = 0.0, 0.0
+            for p in range(slices.split_start[k], slices.split_start[k + 1]):
+                s, lane = slices.split_piece[p] // LANES, slices.split_piece[p] % LANES
+                force += work.pulled[s, FORCE + axis * LANES + lane]
+                area += work.pulled[s, AREA + axis * LANES + lane]
+            g = area / 6.0
+            v = keep * nodes.v[i, axis] + boundary.dt * (w * force + boundary.gravity[axis])
+            nodes.v_star[i, axis] = v
+            if w == 0.0:
+                nodes.force[i, axis] = force
+            if keeps:
+                nodes.gradient[i, axis] = g
+            flow += g * v
+            mobility += w * g * g
+    last = work.sums.shape[0] - 1
+    work.sums[last, 1], work.sums[last, 2] = flow, mobility
+
+
+@njit_lean
+def add_walls(model, nodes, dt):
+    """v* += dt W f of the triangle springs [m/s]; returns what that adds to G·v* [m³/s].
+
+    On entry `nodes.force` holds the spring forces of held nodes, whose W is 0, and zeros elsewhere; the forces are
+    added to it.
+    """
+    flow = 0.0
+    add_membrane_forces(nodes.x, model.membrane, nodes.force)
+    for i in range(nodes.x.shape[0]):
+        push = dt * model.inverse_mass[i]
+        for axis in range(3):
+            nodes.v_star[i, axis] += push * nodes.force[i, axis]
+            flow += nodes.gradient[i, axis] * push * nodes.force[i, axis]
+    return flow

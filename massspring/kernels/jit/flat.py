@@ -13,6 +13,8 @@ from numba.core import cgutils
 from numba.extending import lower_builtin, type_callable
 from numba.np.arrayobj import populate_array
 
+from massspring.kernels.jit.decorators import njit_inlined
+
 
 def flat(table: np.ndarray, first: int, last: int) -> np.ndarray:
     """Rows first ≤ i < last of a contiguous table (n,) or (n, k) as a view, ((last − first) k,)."""
@@ -46,3 +48,22 @@ def _flat(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         meminfo=None,
     )
     return view._getvalue()
+
+
+BLOCK = 64
+"""Nodes per block."""
+
+
+@njit_inlined
+def any_gap_within(gap, begin, reach):
+    """Whether the block from `begin` on has a node with a gap of at most `reach` [m]; always true for a block that is
+    not full.
+
+    NaN counts as near.
+    """
+    if begin + BLOCK > gap.shape[0]:
+        return True
+    block, near = flat(gap, begin, begin + BLOCK), 0
+    for i in range(BLOCK):
+        near += not block[i] > reach
+    return near > 0

@@ -6,8 +6,8 @@ import math
 from massspring.kernels.constraint.ldl_solve import respond_into
 from massspring.kernels.constraint.one_volume import limited_error, surely_short
 from massspring.kernels.constraint.schur import along, beyond, inner_product
-from massspring.kernels.contact.constrained_motion import after_contact, allowed
 from massspring.kernels.contact.face_pairs import part_faces
+from massspring.kernels.contact.node_contact import after_contact, allowed
 from massspring.kernels.jit.decorators import compiled, njit_exposed, njit_inlined, njit_lean, njit_reassociated
 from massspring.kernels.jit.flat import flat
 from massspring.kernels.jit.vec3 import add_to, plus, put, row, times

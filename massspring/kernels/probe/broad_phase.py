@@ -2,8 +2,7 @@
 
 import math
 
-from massspring.kernels.contact.bookkeeping import settled
-from massspring.kernels.contact.modes import FREE
+from massspring.kernels.contact.node_contact import FREE, settled
 from massspring.kernels.jit.decorators import njit_ignoring_nan, njit_lean
 from massspring.kernels.jit.flat import flat
 from massspring.kernels.jit.vec3 import dot, plus, row, times

@@ -10,7 +10,7 @@ Eliminating the change of pressure δ leaves A c ≥ right with A_kl = Σ_i b_ki
 """
 
 from massspring.kernels.constraint.schur import solve_dense
-from massspring.kernels.contact.constrained_motion import allowed
+from massspring.kernels.contact.node_contact import allowed
 from massspring.kernels.jit.decorators import njit_lean
 from massspring.kernels.jit.vec3 import add_to, dot, put, row, times
 from massspring.kernels.probe.pressure import answer_into, change_of_rows, flow_into

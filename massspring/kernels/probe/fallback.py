@@ -8,7 +8,7 @@ all three corners are held, the tip goes through, and the run records it.
 import math
 
 from massspring.kernels.arrays.layout import Push
-from massspring.kernels.contact.modes import FREE, STICKS
+from massspring.kernels.contact.node_contact import FREE, STICKS
 from massspring.kernels.jit.decorators import njit_lean
 from massspring.kernels.jit.vec3 import add_to, dot, minus, over, plus, put, row, times
 from massspring.kernels.probe.arrays import CARRIED, CARRYING, LEFT_BEHIND

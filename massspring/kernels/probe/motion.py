@@ -2,7 +2,7 @@
 
 import math
 
-from massspring.kernels.contact.constrained_motion import after_contact
+from massspring.kernels.contact.node_contact import after_contact
 from massspring.kernels.jit.decorators import njit_lean
 from massspring.kernels.jit.vec3 import add_to, dot, minus, over, plus, put, row, take_from, times
 from massspring.kernels.probe.pressure import swelling

@@ -7,7 +7,7 @@ import math
 
 from massspring.kernels.constraint.jacobian import diagonal_into, transposed_rows_times_into
 from massspring.kernels.constraint.schur import dense_into, factor_dense, solve_iteratively, substitute
-from massspring.kernels.contact.constrained_motion import allowed
+from massspring.kernels.contact.node_contact import allowed
 from massspring.kernels.jit.decorators import njit_lean
 from massspring.kernels.jit.vec3 import dot, plus, row, times
 

@@ -1,11 +1,47 @@
-"""The beginning of every step: the prediction before the volumes are solved for, and the search for contacts."""
+"""The beginning of every step: prediction, prescribed motion, and the search for contacts."""
 
 from massspring.kernels.contact.active_set import CONTACT_PASSES, find_contacts, revise_contacts
-from massspring.kernels.fused.padded import pad_positions
+from massspring.kernels.fused.chunk import pad_positions
 from massspring.kernels.fused.sweep import predict_from_places
-from massspring.kernels.jit.decorators import njit_exposed, njit_inlined
+from massspring.kernels.jit.decorators import compiled, njit_exposed, njit_inlined, njit_lean
 from massspring.kernels.jit.stage_clock import BETWEEN_FRAMES, HELD, MULTIPLIER, REVISION, SEARCH, SPRINGS, end_stage
-from massspring.kernels.step.attachments import prescribe, prescribe_velocity_into
+from massspring.kernels.jit.vec3 import add_to, row, times
+
+
+@njit_lean
+def prescribe_velocity_into(x, held_nodes, held_group, held_rest, displacement, dt, v_star):
+    """v*_i = (X_i + d_g − x_i)/dt [m/s] for every held node: it ends the step where its attachment is (eq. 3.2)."""
+    for h in range(held_nodes.shape[0]):
+        i = held_nodes[h]
+        g = held_group[h]
+        for axis in range(3):
+            v_star[i, axis] = (held_rest[h, axis] + displacement[g, axis] - x[i, axis]) / dt
+
+
+@njit_exposed
+def prescribe(model, nodes, displacement, dt):
+    """v* of held nodes (eq. 3.2); returns the change of G·v* [m³/s]."""
+    held_nodes, groups, rest = model.held_nodes, model.held_group, model.held_rest
+    x, v_star, gradient = nodes.x, nodes.v_star, nodes.gradient
+    flow, per_step = 0.0, 1.0 / dt
+    for h in range(held_nodes.shape[0]):
+        i, g = held_nodes[h], groups[h]
+        for axis in range(3):
+            held = per_step * (rest[h, axis] + displacement[g, axis] - x[i, axis])
+            flow += gradient[i, axis] * (held - v_star[i, axis])
+            v_star[i, axis] = held
+    return flow
+
+
+@compiled
+def add_to_prediction(model, nodes, force, dt):
+    """v* += dt W f [m/s] for one more force [N], (n, 3), which is also added to the force on held nodes (eq. 3.1,
+    3.6)."""
+    for i in range(force.shape[0]):
+        add_to(nodes.v_star, i, times(dt * model.inverse_mass[i], row(force, i)))
+    for h in range(model.held_nodes.shape[0]):
+        i = model.held_nodes[h]
+        add_to(nodes.force, i, row(force, i))
 
 
 @njit_exposed

@@ -3,7 +3,7 @@
 
 import numpy as np
 
-from massspring.kernels.contact.modes import FREE, SLIDES, STICKS
+from massspring.kernels.contact.node_contact import FREE, SLIDES, STICKS
 from massspring.methods.implicit.contact import SLIP_RESOLUTION, Contact, TouchedRows
 
 WITHIN = 1.0 - 1e-9

@@ -11,7 +11,7 @@ from massspring.kernels.arrays.layout import BoundaryConditions, Contacts, Nodes
 from massspring.kernels.forces.elements import Elements
 from massspring.kernels.forces.springs import spring_energy, spring_forces_into
 from massspring.kernels.jit.stage_clock import HELD, INTEGRATION, MULTIPLIER, REVISION, SPRINGS, end_stage
-from massspring.kernels.step.attachments import add_held_impulse
+from massspring.kernels.step.end import add_held_impulse
 from massspring.layout.state import State
 from massspring.methods.elements.friction import RubbedContact
 from massspring.methods.elements.laws import Law

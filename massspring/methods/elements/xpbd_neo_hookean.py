@@ -23,7 +23,7 @@ from massspring.body.body import Body
 from massspring.errors import MassSpringError
 from massspring.kernels.arrays.layout import BoundaryConditions, Push
 from massspring.kernels.constraint.neo_hookean import relax_elements
-from massspring.kernels.contact.constrained_motion import unpushed_into
+from massspring.kernels.contact.node_contact import unpushed_into
 from massspring.kernels.forces.elements import Elements
 from massspring.kernels.jit.decorators import njit_lean
 from massspring.kernels.step.begin import begin_step, multiplier_stands, open_frame, search_contacts

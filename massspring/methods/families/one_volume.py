@@ -18,9 +18,9 @@ from massspring.kernels.arrays.layout import BoundaryConditions, Push
 from massspring.kernels.constraint.exact_volume import LineSearch, line_into, nearest_root, volume_cubic
 from massspring.kernels.constraint.one_volume import limited_error, steepest, surely_short, volume_multiplier
 from massspring.kernels.contact.active_set import pressure_reach
-from massspring.kernels.contact.constrained_motion import allowed
+from massspring.kernels.contact.node_contact import allowed
 from massspring.kernels.forces.volume import volume_gradient_into
-from massspring.kernels.fused.padded import pad_positions
+from massspring.kernels.fused.chunk import pad_positions
 from massspring.kernels.jit.decorators import compiled, njit_lean
 from massspring.kernels.jit.stage_clock import MULTIPLIER, VOLUME, end_stage
 from massspring.kernels.jit.vec3 import add_to, plus, put, row, times

@@ -21,10 +21,8 @@ from massspring.kernels.points.solve import (
     solve_iteratively,
     weigh_into,
 )
-from massspring.kernels.step.advance import advance
-from massspring.kernels.step.attachments import add_held_impulse
 from massspring.kernels.step.begin import begin_step, count_iterations, open_frame, search_contacts
-from massspring.kernels.step.end import end_step
+from massspring.kernels.step.end import add_held_impulse, advance, end_step
 from massspring.kernels.step.touching_faces import begin_pairs, contacts_stand, search_pairs
 
 

@@ -16,9 +16,8 @@ from massspring.kernels.forces.tetrahedron_volumes import (
 )
 from massspring.kernels.jit.decorators import njit_lean
 from massspring.kernels.jit.stage_clock import VOLUME, end_stage
-from massspring.kernels.step.begin import begin_step, open_frame, search_contacts
+from massspring.kernels.step.begin import add_to_prediction, begin_step, open_frame, search_contacts
 from massspring.kernels.step.end import end_step
-from massspring.kernels.step.predict import add_to_prediction
 from massspring.layout.state import State
 from massspring.methods.method import begin_frame
 

@@ -6,8 +6,8 @@ from scipy.linalg import get_lapack_funcs
 from massspring.kernels.arrays.layout import BoundaryConditions, Contacts, Model, Nodes, Push
 from massspring.kernels.contact.active_set import release_all
 from massspring.kernels.contact.friction import activate_edges
-from massspring.kernels.contact.implicit_contact import activate_entering
-from massspring.kernels.contact.modes import FREE, HIDDEN, ON_EDGE, SLIDES, STICKS
+from massspring.kernels.contact.node_contact import FREE, HIDDEN, ON_EDGE, SLIDES, STICKS
+from massspring.kernels.step.implicit_step import activate_entering
 from massspring.methods.implicit.factor import Factor
 
 FACTORED, SOLVED = get_lapack_funcs(("potrf", "potrs"), dtype=np.float64)

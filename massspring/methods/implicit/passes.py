@@ -19,7 +19,7 @@ from massspring.kernels.jit.stage_clock import (
     VOLUME,
     end_stage,
 )
-from massspring.kernels.step.attachments import add_held_impulse
+from massspring.kernels.step.end import add_held_impulse
 from massspring.kernels.step.implicit_step import imbalance_into
 from massspring.layout.jacobian_pattern import DENSE_UP_TO
 from massspring.layout.state import State

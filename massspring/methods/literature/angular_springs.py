@@ -31,8 +31,7 @@ from massspring.layout.allocate import start
 from massspring.layout.state import State
 from massspring.methods.capabilities import Capabilities, No
 from massspring.methods.method import Method, begin_frame
-from massspring.world.obstacles import Attachment
-from massspring.world.surroundings import Surroundings
+from massspring.world.obstacles import Attachment, Surroundings
 
 TIE = 1e-9
 """Difference below which two cosines count as equal; the first node is then chosen."""

@@ -26,8 +26,7 @@ from massspring.layout.state import State
 from massspring.methods.capabilities import Capabilities, No
 from massspring.methods.literature.chain_links import Links, Mail, propagate, push_out, relax
 from massspring.methods.method import Method, begin_frame
-from massspring.world.obstacles import Attachment
-from massspring.world.surroundings import Surroundings
+from massspring.world.obstacles import Attachment, Surroundings
 
 ROUNDS = 20
 """Most rounds of obstacles and links in a step; the next step finds nodes that are still inside."""

@@ -33,8 +33,7 @@ from massspring.methods.literature.linear_body import (
 )
 from massspring.methods.literature.pressing import press
 from massspring.methods.method import Method, begin_frame
-from massspring.world.obstacles import Attachment
-from massspring.world.surroundings import Surroundings
+from massspring.world.obstacles import Attachment, Surroundings
 
 MOST_BYTES = 2e9
 """Largest size of the columns [bytes]."""

@@ -13,7 +13,7 @@ from massspring.errors import MassSpringError
 from massspring.kernels.arrays.layout import BoundaryConditions, Model
 from massspring.methods.elements.implicit_elements import ImplicitElements
 from massspring.methods.elements.tangent import elements_of
-from massspring.world.surroundings import Surroundings
+from massspring.world.obstacles import Surroundings
 
 STRAIGHT = 1e-6
 """Distance from a straight line, over the extent of the held nodes, within which held nodes leave the body free to

@@ -39,8 +39,7 @@ from massspring.methods.literature.linear_body import (
 )
 from massspring.methods.literature.pressing import Pressed, press
 from massspring.methods.method import Method, begin_frame
-from massspring.world.obstacles import Attachment
-from massspring.world.surroundings import Surroundings
+from massspring.world.obstacles import Attachment, Surroundings
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,7 @@ from massspring import (
 from massspring.body.body import NO_FACETS
 from massspring.methods import VARIANTS
 from massspring.run.precision import Precision
-from massspring.world.surroundings import Surroundings
+from massspring.world.obstacles import Surroundings
 from studies.sweep.compiling.bodies import EDGE, KINDS, tiny_body
 
 FRAMES, STEPS = 2, 2

@@ -20,8 +20,8 @@ from massspring import (
 from massspring.analysis.stability import scaled_stiffness
 from massspring.analysis.stiffness import membrane_stiffness
 from massspring.body.membranes import lloyd_springs, triangle_springs
-from massspring.kernels.arrays.spring_layout import Membrane
-from massspring.kernels.forces.membrane import add_membrane_forces, membrane_energy
+from massspring.kernels.arrays.layout import Membrane
+from massspring.kernels.forces.springs import add_membrane_forces, membrane_energy
 from tests.massspring.conftest import SOFT, icosphere
 from tests.massspring.kernels.forces.test_forces import directional
 

@@ -22,7 +22,7 @@ from massspring import (
     step_limit,
     tetrahedral_body,
 )
-from massspring.kernels.contact.modes import ON_EDGE, SLIDES, STICKS
+from massspring.kernels.contact.node_contact import ON_EDGE, SLIDES, STICKS
 from massspring.methods.implicit.contact import ActiveSet
 from massspring.methods.implicit.factor import Factor
 from tests.massspring.conftest import SOFT, block

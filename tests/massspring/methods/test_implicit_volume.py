@@ -7,7 +7,7 @@ import pytest
 
 import massspring.layout.jacobian_pattern as rows_module
 from massspring import Attachment, Free, ImplicitVolume, Ramp, Setup, Volumes, simulate
-from massspring.kernels.forces.tetrahedra import tetrahedron_volumes_into
+from massspring.kernels.forces.volume import tetrahedron_volumes_into
 from tests.massspring.methods.test_methods import clock_for, squeeze
 
 

@@ -6,10 +6,9 @@ import pytest
 from massspring import METHODS, Clock, Element, Free, Penalty, Pressure, Pyramid, Setup, Xpbd, simulate
 from massspring.kernels.arrays.layout import Accuracy
 from massspring.kernels.constraint.tetrahedra import cell_rows_into, solve_cells
-from massspring.kernels.contact.modes import SLIDES
-from massspring.kernels.forces.tetrahedra import tetrahedron_volumes_into
+from massspring.kernels.contact.node_contact import SLIDES
 from massspring.kernels.forces.tetrahedron_volumes import add_barycentre_forces, add_volume_forces, cell_slopes
-from massspring.kernels.forces.volume import enclosed_volume, pyramid_volume
+from massspring.kernels.forces.volume import enclosed_volume, pyramid_volume, tetrahedron_volumes_into
 from massspring.layout.allocate import start
 from massspring.methods.families.tetrahedra import cells_of
 from tests.massspring.methods.test_methods import clock_for, squeeze, thrown

@@ -7,7 +7,7 @@ from scipy.sparse import csr_array
 from massspring import Body, Volumes
 from massspring.kernels.arrays.volume_rows import VolumeRows
 from massspring.kernels.constraint.jacobian import diagonal_into, rows_into
-from massspring.kernels.contact.modes import ON_EDGE, SLIDES, STICKS
+from massspring.kernels.contact.node_contact import ON_EDGE, SLIDES, STICKS
 from massspring.layout.allocate import start
 from massspring.layout.jacobian_pattern import volume_rows
 from massspring.layout.ring_areas import quadrangles

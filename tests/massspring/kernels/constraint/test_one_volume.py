@@ -9,8 +9,8 @@ from massspring import Attachment, Clock, ImplicitVolume, Setup
 from massspring.kernels.arrays.layout import Push
 from massspring.kernels.constraint.one_volume import volume_multiplier
 from massspring.kernels.forces.volume import enclosed_volume, volume_gradient_into
-from massspring.kernels.step.advance import advance
 from massspring.kernels.step.begin import open_frame
+from massspring.kernels.step.end import advance
 from massspring.layout.allocate import start
 from massspring.layout.state import new_diagnostics
 from tests.massspring.active_nodes import activate

@@ -10,9 +10,9 @@ from massspring import Attachment, Body, Clock, ImplicitVolume, Setup, Volumes
 from massspring.kernels.arrays.layout import Accuracy, Push
 from massspring.kernels.constraint.jacobian import diagonal_into, rows_into, transposed_rows_times_into
 from massspring.kernels.constraint.schur import solve_iteratively
-from massspring.kernels.contact.modes import ON_EDGE, STICKS
-from massspring.kernels.step.advance import advance
+from massspring.kernels.contact.node_contact import ON_EDGE, STICKS
 from massspring.kernels.step.begin import open_frame
+from massspring.kernels.step.end import advance
 from massspring.layout.allocate import start
 from massspring.layout.jacobian_pattern import volume_rows
 from massspring.layout.state import new_diagnostics

@@ -10,7 +10,7 @@ from massspring import Capsule, Clock, ImplicitVolume, Plane, Setup, Sphere, Tra
 from massspring.kernels.arrays.layout import Push
 from massspring.kernels.contact.active_set import find_contacts, pressure_reach, revise_contacts
 from massspring.kernels.contact.friction import release_edges
-from massspring.kernels.contact.modes import FREE, ON_EDGE, SLIDES, STICKS
+from massspring.kernels.contact.node_contact import FREE, ON_EDGE, SLIDES, STICKS
 from tests.massspring.active_nodes import list_active
 from tests.massspring.conftest import SOFT, icosphere
 from tests.massspring.kernels.contact.test_obstacles import wedge_of

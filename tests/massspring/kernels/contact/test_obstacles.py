@@ -17,7 +17,7 @@ from massspring import (
 )
 from massspring.kernels.arrays.layout import Push
 from massspring.kernels.contact.active_set import find_contacts, pressure_reach, revise_contacts
-from massspring.kernels.contact.modes import ON_EDGE
+from massspring.kernels.contact.node_contact import ON_EDGE
 from tests.massspring.conftest import SOFT, block
 from tests.massspring.methods.test_methods import clock_for, squeeze
 

@@ -6,8 +6,12 @@ import pytest
 from massspring import Body
 from massspring.kernels.constraint.exact_volume import nearest_root, volume_cubic
 from massspring.kernels.forces.springs import spring_energy, spring_forces_into
-from massspring.kernels.forces.tetrahedra import smallest_ratio, tetrahedron_volumes_into
-from massspring.kernels.forces.volume import enclosed_volume, volume_gradient_into
+from massspring.kernels.forces.volume import (
+    enclosed_volume,
+    smallest_ratio,
+    tetrahedron_volumes_into,
+    volume_gradient_into,
+)
 
 ROUND_OFF = 1e-13  # relative; sums of a few thousand doubles
 STEP = 1e-6  # relative central differences: error ~ 1e-12 truncation + 1e-10 round-off

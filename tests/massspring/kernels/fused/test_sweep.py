@@ -6,11 +6,10 @@ import pytest
 from massspring import Attachment, Body, Clock, Free, ImplicitVolume, Setup, tetrahedral_body
 from massspring.body.springs import Springs
 from massspring.kernels.constraint.one_volume import multiplier_of_sums, volume_multiplier
-from massspring.kernels.contact.modes import ON_EDGE, SLIDES, STICKS
-from massspring.kernels.forces.membrane import add_membrane_forces
-from massspring.kernels.forces.springs import spring_forces_into
+from massspring.kernels.contact.node_contact import ON_EDGE, SLIDES, STICKS
+from massspring.kernels.forces.springs import add_membrane_forces, spring_forces_into
 from massspring.kernels.forces.volume import volume_gradient_into
-from massspring.kernels.step.attachments import prescribe
+from massspring.kernels.step.begin import prescribe
 from massspring.layout.allocate import start
 from massspring.layout.sell_chunks import LONGEST, rings
 from tests.massspring.active_nodes import list_active

@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 from numba.core.errors import TypingError
 
-from massspring.kernels.jit.blocks import BLOCK, any_gap_within
 from massspring.kernels.jit.by_address import by_address
 from massspring.kernels.jit.decorators import compiled, njit_inlined, njit_lean
-from massspring.kernels.jit.flat import flat
-from massspring.layout.morton import along_curve
+from massspring.kernels.jit.flat import BLOCK, any_gap_within, flat
+from massspring.layout.sell_chunks import along_curve
 
 
 @njit_lean

@@ -7,7 +7,7 @@ import pytest
 
 from massspring import Clock, Free, ImplicitVolume, Probe, Setup, Trajectory
 from massspring.kernels.arrays.layout import Push
-from massspring.kernels.contact.modes import FREE, ON_EDGE, SLIDES, STICKS
+from massspring.kernels.contact.node_contact import FREE, ON_EDGE, SLIDES, STICKS
 from massspring.kernels.probe.arrays import IN_CONTACT
 from massspring.kernels.probe.broad_phase import fastest_node
 from massspring.kernels.probe.continuous import NEVER, crossing, nearest_into, passes_by, stays_off

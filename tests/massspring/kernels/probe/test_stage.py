@@ -20,7 +20,7 @@ from massspring import (
 )
 from massspring.body.inside import is_inside, mean_edge
 from massspring.kernels.arrays.layout import Push
-from massspring.kernels.contact.modes import FREE
+from massspring.kernels.contact.node_contact import FREE
 from massspring.kernels.probe.arrays import CARRIED, CARRYING, COMPARED, IN_CONTACT, LEFT_BEHIND, Stage
 from massspring.kernels.probe.contacts import solve_rows
 from massspring.kernels.probe.fallback import overshoot

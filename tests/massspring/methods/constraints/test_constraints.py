@@ -17,7 +17,7 @@ from massspring import (
     step_limit,
 )
 from massspring.analysis.stiffness import spring_stiffness, volume_hessian
-from massspring.kernels.contact.modes import FREE, SLIDES
+from massspring.kernels.contact.node_contact import FREE, SLIDES
 from massspring.kernels.forces.volume import enclosed_volume
 from massspring.methods.families.one_volume import Rule, advance_by, correct_positions
 from massspring.methods.method import begin_frame

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from massspring import Clock, ImplicitSprings, Plane, Setup, Trajectory
-from massspring.kernels.contact.modes import SLIDES, STICKS
+from massspring.kernels.contact.node_contact import SLIDES, STICKS
 from massspring.methods.implicit.contact import SLIP_RESOLUTION, ActiveSet, Contact
 
 DT, MU = 5e-3, 0.5
