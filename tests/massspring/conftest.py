@@ -5,6 +5,11 @@ import pytest
 from scipy.spatial import Delaunay
 
 from massspring import Body, Material, Volumes, surface_body, tetrahedral_body
+from massspring.kernels.arrays.layout import Contacts
+from massspring.kernels.contact.node_contact import SLIDES
+from massspring.kernels.fused.chunk import pad_positions
+from massspring.kernels.fused.sweep import predict_from_places
+from massspring.kernels.jit.decorators import njit_lean
 from tests.massspring.rows import KINDS
 
 SOFT = Material(shear_modulus=1800.0, density=1060.0)
@@ -134,3 +139,29 @@ def several(request: pytest.FixtureRequest, block_body: Body, hollow_body: Body)
 def body(request: pytest.FixtureRequest) -> Body:
     """Either kind of body."""
     return request.getfixturevalue(f"{request.param}_body")
+
+
+def list_active(contacts: Contacts) -> None:
+    """Lists the touched nodes, as the contact search does for those that it activates."""
+    nodes = np.flatnonzero(contacts.mode)
+    contacts.active[: len(nodes)] = nodes
+    contacts.active_count[0] = len(nodes)
+
+
+def activate(contacts: Contacts, nodes: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """Activates free nodes (c,) on one obstacle, with random normals; the target speeds along them [m/s], (c,)."""
+    normals = rng.normal(size=(len(nodes), 3))
+    contacts.normal[nodes] = normals / np.linalg.norm(normals, axis=1)[:, None]
+    approach = 0.05 * rng.normal(size=len(nodes))
+    contacts.contact_id[nodes], contacts.mode[nodes] = 1, SLIDES
+    contacts.direction[nodes] = contacts.normal[nodes]
+    contacts.v_target[nodes] = approach[:, None] * contacts.normal[nodes]
+    list_active(contacts)
+    return approach
+
+
+@njit_lean
+def gather_and_predict(model, nodes, work, boundary, keeps):
+    """v* and (V, G·v*, G·W·G) from `x`, as `predict_from_places`."""
+    pad_positions(nodes, work, 0, nodes.x.shape[0])
+    return predict_from_places(model, nodes, work, boundary, keeps)

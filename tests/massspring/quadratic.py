@@ -1,10 +1,12 @@
-"""Meshes of quadratic tetrahedra made without a mesher: blocks, straight or curved, balls and hollow balls."""
+"""Elastic bodies of linear and quadratic elements: meshes, energies from the definition, and a closed form."""
 
 from itertools import product
 
 import numpy as np
+from scipy.optimize import brentq
 
-from massspring import Body, quadratic_body
+from massspring import Body, Volumes, quadratic_body, tetrahedral_body
+from massspring.body.laws import Edges
 from massspring.body.points import PAIRS, PointVolumes
 from massspring.body.quadratic import boundary_facets
 from tests.massspring.conftest import SOFT, block, hollow_block, icosphere
@@ -143,3 +145,66 @@ def exact_volume(points: np.ndarray, cells: np.ndarray) -> float:
             sides.append(np.tensordot(np.diff(shape_functions(b), axis=0)[0] / (2 * step), points[cells], (0, 1)))
         total += wr * ws * wt * (1 - r) ** 2 * (1 - s) * float(np.linalg.det(np.stack(sides, axis=1)).sum())
     return total
+
+
+MU = SOFT.shear_modulus
+
+
+def linear_solid(cells=(3, 3, 2), **options) -> Body:
+    """Linear tetrahedra with one volume per node."""
+    body = tetrahedral_body(*block(cells, **options), SOFT, "cotangent")
+    return body.keeping(Volumes.nodal(body))
+
+
+def curved_solid(**options) -> Body:
+    """Quadratic tetrahedra with bent sides."""
+    return quadratic_body(*curved_block(), SOFT, **options)
+
+
+def straight_solid(cells=(2, 2, 2), distortion=0.15, **options) -> Body:
+    """Quadratic tetrahedra with straight sides."""
+    return quadratic_body(*quadratic_block(cells, distortion=distortion), SOFT, **options)
+
+
+def deformation(body: Body, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """F at the points of all elements at `x` (n, 3), (p, 3, 3), and their weights [m³], (p,)."""
+    if isinstance(body.kept, PointVolumes):
+        return body.kept.deformation(x).reshape(-1, 3, 3), body.kept.weight.ravel()
+    edges = Edges(body.rest, body.tetrahedra)
+    return np.einsum("kai,kaj->kij", x[body.tetrahedra], edges.gradients()), edges.volumes
+
+
+def energy_without_volume(body: Body, x: np.ndarray) -> float:
+    """∫ mu/2 (|F|² − 3) − mu (J − 1) + b/2 (J − 1)² [J], straight from the definition."""
+    f, weight = deformation(body, x)
+    j = np.linalg.det(f)
+    density = MU / 2 * ((f * f).sum(axis=(1, 2)) - 3) - MU * (j - 1) + body.local_bulk / 2 * (j - 1) ** 2
+    return float(weight @ density)
+
+
+def nodal_energy(body: Body, x: np.ndarray, ratio: float) -> float:
+    """The same with K/2 Σ V0_r (V_r/V0_r − 1)²: a pressure for each kept volume."""
+    strain = body.kept.measure(x) / body.rest_volumes - 1
+    return energy_without_volume(body, x) + 0.5 * ratio * MU * float(body.rest_volumes @ strain**2)
+
+
+def uniaxial(stretch: float, bulk: float) -> tuple[float, float]:
+    """(stretch across, nominal stress [Pa]) of a bar drawn to `stretch` with free sides, W = mu/2 (|F|² − 3) − mu
+    (J − 1) + bulk/2 (J − 1)² [Pa].
+
+    Free sides: mu c = (mu − bulk (J − 1)) · a c with the stretch along a, J = a c²; stress mu a − (mu − bulk (J − 1))
+    c².
+    """
+    a = stretch
+
+    def side(c: float) -> float:
+        return MU - (MU - bulk * (a * c * c - 1.0)) * a
+
+    c = float(brentq(side, 0.3, 3.0, xtol=1e-15))
+    return c, MU * a - (MU - bulk * (a * c * c - 1.0)) * c * c
+
+
+def stretched(rest: np.ndarray, stretch: float, bulk: float) -> np.ndarray:
+    """A body in uniaxial stretch along z."""
+    across, _ = uniaxial(stretch, bulk)
+    return rest * np.array([across, across, stretch])

@@ -5,6 +5,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from massspring.analysis.modes import natural_frequencies
 
 from massspring import (
     AngularSprings,
@@ -43,12 +44,10 @@ from massspring import (
     surface_body,
     tetrahedral_body,
 )
-from massspring.analysis.modes import natural_frequencies
 from massspring.body.axis import virtual_nodes
 from massspring.body.inside import mean_edge
 from tests.massspring.conftest import SOFT, block, hollow_block, icosphere
-from tests.massspring.methods.elements.solids import curved_solid, linear_solid
-from tests.massspring.quadratic import hollow_ball, quadratic_block
+from tests.massspring.quadratic import curved_solid, hollow_ball, linear_solid, quadratic_block
 
 NAN, INF = float("nan"), float("inf")
 MESH = icosphere(1)

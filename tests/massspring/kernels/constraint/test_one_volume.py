@@ -13,7 +13,7 @@ from massspring.kernels.step.begin import open_frame
 from massspring.kernels.step.end import advance
 from massspring.layout.allocate import start
 from massspring.layout.state import new_diagnostics
-from tests.massspring.active_nodes import activate
+from tests.massspring.conftest import activate
 from tests.massspring.methods.test_methods import clock_for, thrown
 
 

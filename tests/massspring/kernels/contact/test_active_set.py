@@ -11,8 +11,7 @@ from massspring.kernels.arrays.layout import Push
 from massspring.kernels.contact.active_set import find_contacts, pressure_reach, revise_contacts
 from massspring.kernels.contact.friction import release_edges
 from massspring.kernels.contact.node_contact import FREE, ON_EDGE, SLIDES, STICKS
-from tests.massspring.active_nodes import list_active
-from tests.massspring.conftest import SOFT, icosphere
+from tests.massspring.conftest import SOFT, icosphere, list_active
 from tests.massspring.kernels.contact.test_obstacles import wedge_of
 
 DT = 1e-3

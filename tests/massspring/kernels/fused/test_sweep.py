@@ -12,9 +12,7 @@ from massspring.kernels.forces.volume import volume_gradient_into
 from massspring.kernels.step.begin import prescribe
 from massspring.layout.allocate import start
 from massspring.layout.sell_chunks import LONGEST, rings
-from tests.massspring.active_nodes import list_active
-from tests.massspring.conftest import SOFT, block, icosphere
-from tests.massspring.gathered import gather_and_predict
+from tests.massspring.conftest import SOFT, block, gather_and_predict, icosphere, list_active
 from tests.massspring.kernels.forces.test_forces import DIFFERENCE, STEP, moved
 
 ROUND_OFF = 1e-14  # relative to the largest: sums of at most some hundred doubles in another order

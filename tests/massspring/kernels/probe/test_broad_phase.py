@@ -11,7 +11,7 @@ from massspring.kernels.contact.node_contact import FREE, ON_EDGE, SLIDES, STICK
 from massspring.kernels.probe.arrays import IN_CONTACT
 from massspring.kernels.probe.broad_phase import fastest_node
 from massspring.kernels.probe.continuous import NEVER, crossing, nearest_into, passes_by, stays_off
-from tests.massspring.active_nodes import list_active
+from tests.massspring.conftest import list_active
 from tests.massspring.kernels.probe.test_continuous import pair_of
 from tests.massspring.kernels.probe.test_stage import BALL, EDGE, R, pressed
 

@@ -14,10 +14,9 @@ from massspring.kernels.forces.corotated import (
 )
 from massspring.kernels.forces.springs import spring_energy, spring_forces_into
 from massspring.methods.elements.tangent import Pattern, elements_of, target_ratios
-from tests.massspring.methods.elements.solids import MU, deformation, linear_solid
 from tests.massspring.methods.families.test_points import CONTRACT
 from tests.massspring.methods.test_methods import squeeze
-from tests.massspring.quadratic import jiggled
+from tests.massspring.quadratic import MU, deformation, jiggled, linear_solid
 
 BULK = 20.0 * MU
 SECOND = BULK - MU

@@ -8,8 +8,7 @@ from massspring.kernels.forces.elements import add_element_stiffness, element_en
 from massspring.kernels.forces.springs import spring_energy, spring_forces_into
 from massspring.methods.elements.newton import NewtonStep
 from massspring.methods.elements.tangent import elements_of, target_ratios
-from tests.massspring.methods.elements.solids import MU, curved_solid, deformation, energy_without_volume, linear_solid
-from tests.massspring.quadratic import jiggled
+from tests.massspring.quadratic import MU, curved_solid, deformation, energy_without_volume, jiggled, linear_solid
 
 BULK = 20.0 * MU
 

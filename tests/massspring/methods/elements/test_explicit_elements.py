@@ -6,7 +6,11 @@ import pytest
 from massspring import Attachment, Clock, ExplicitElements, Ramp, Setup, Volumes, simulate, step_limit, tetrahedral_body
 from massspring.analysis.stiffness import stiffness_at_rest
 from tests.massspring.conftest import SOFT, hollow_block
-from tests.massspring.methods.elements.solids import (
+from tests.massspring.methods.families.test_points import CONTRACT
+from tests.massspring.methods.test_guards import LINE
+from tests.massspring.methods.test_implicit_volume import start_of
+from tests.massspring.methods.test_methods import clock_for, squeeze
+from tests.massspring.quadratic import (
     MU,
     curved_solid,
     linear_solid,
@@ -14,10 +18,6 @@ from tests.massspring.methods.elements.solids import (
     straight_solid,
     uniaxial,
 )
-from tests.massspring.methods.families.test_points import CONTRACT
-from tests.massspring.methods.test_guards import LINE
-from tests.massspring.methods.test_implicit_volume import start_of
-from tests.massspring.methods.test_methods import clock_for, squeeze
 
 BODIES = {"linear": linear_solid, "quadratic": curved_solid, "contact at nodes": lambda: curved_solid(contact="nodes")}
 RATIO = ExplicitElements.bulk_ratio

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from massspring import Attachment, Clock, ImplicitElements, Plane, Ramp, Setup, simulate, step_limit
-from tests.massspring.methods.elements.solids import MU, curved_solid, linear_solid, straight_solid, uniaxial
 from tests.massspring.methods.families.test_points import CONTRACT
 from tests.massspring.methods.test_guards import LINE
 from tests.massspring.methods.test_implicit_volume import start_of
 from tests.massspring.methods.test_methods import clock_for, squeeze, thrown
+from tests.massspring.quadratic import MU, curved_solid, linear_solid, straight_solid, uniaxial
 
 BODIES = {"linear": linear_solid, "quadratic": lambda: curved_solid(contact="nodes")}
 RATIO = ImplicitElements.bulk_ratio

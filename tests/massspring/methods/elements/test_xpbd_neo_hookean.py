@@ -6,10 +6,9 @@ import pytest
 from massspring import Clock, Ramp, Setup, XpbdNeoHookean, simulate
 from massspring.kernels.constraint.neo_hookean import relax_elements
 from massspring.methods.elements.tangent import elements_of
-from tests.massspring.methods.elements.solids import MU, linear_solid, uniaxial
 from tests.massspring.methods.families.test_points import CONTRACT
 from tests.massspring.methods.test_methods import squeeze
-from tests.massspring.quadratic import jiggled
+from tests.massspring.quadratic import MU, jiggled, linear_solid, uniaxial
 
 RATIO = XpbdNeoHookean.bulk_ratio
 SCALE = 1e-6

@@ -5,9 +5,9 @@ import pytest
 
 from massspring import Attachment, ImplicitVolume, Plane, Setup, Volumes, simulate, tetrahedral_body
 from tests.massspring.conftest import SOFT
-from tests.massspring.methods.elements.solids import curved_solid
 from tests.massspring.methods.test_implicit_volume import STARTS, start_of
 from tests.massspring.methods.test_methods import clock_for, thrown
+from tests.massspring.quadratic import curved_solid
 
 RECOVERS = ImplicitVolume(recovers=True)
 LINE = (np.diag([1, 0, 0]), 0.0)

@@ -24,8 +24,7 @@ from massspring.body.points import PointVolumes
 from massspring.methods.literature.linear_body import linear_stiffness
 from massspring.methods.literature.linear_modes import modes_of
 from massspring.methods.literature.pressing import complementary
-from tests.massspring.methods.elements.solids import MU, curved_solid, linear_solid, straight_solid
-from tests.massspring.quadratic import hollow_ball
+from tests.massspring.quadratic import MU, curved_solid, hollow_ball, linear_solid, straight_solid
 
 RATIO = ElasticResponse.bulk_ratio
 BODIES = {"linear": linear_solid, "quadratic": lambda: straight_solid(contact="nodes")}
