@@ -5,7 +5,6 @@ from functools import cache
 
 import numpy as np
 import pytest
-from massspring.analysis.modes import natural_frequencies
 
 from massspring import (
     AngularSprings,
@@ -135,8 +134,6 @@ TABLE = [
     ("the body has none; fill its mesh", lambda: Volumes.regions(ball(), 4)),
     ("names a node beyond", lambda: cells().keeping(Volumes.nodal(hollow()))),
     # Time.
-    ("modes asked of", lambda: natural_frequencies(ball(), 0)),
-    ("modes asked of", lambda: natural_frequencies(ball(), 10_000)),
     *[("dt is", lambda dt=dt: make_clock(1.0, 10, dt, LIMIT)) for dt in (0.0, -1.0, NAN, "fast")],
     (r"dt = 0\.005 s lies above the stability limit of 0\.002 s; take", lambda: make_clock(1.0, 10, 0.005, LIMIT)),
     ("3 frames in inf s", lambda: make_clock(INF, 3, "auto", LIMIT)),

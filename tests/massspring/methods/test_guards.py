@@ -100,12 +100,12 @@ def test_a_limited_correction_moves_no_node_farther_than_it_claims(case):
     # A force goes that far in a long step only; what is solved for goes at once, and short steps leave springs out.
     fraction = 0.02 if case.method.volume_tol else 0.5
     reached = 0
-    for scale in (0.05, 0.5, 0.9, 0.999):
+    for scale in (0.05, 0.5, 0.9, 0.999, 2.0):
         far, limited = corrected(case, scale * np.eye(3), clock_for(case.body, 1, 1, fraction))
         assert far < 1.0 + 2e-4  # of springs, 1e-4 in implicit ones
         assert limited == (far > 0.99)
         reached += limited
-    assert 0 < reached < 4, "either nothing was cut or everything"
+    assert 0 < reached < 5, "either nothing was cut or everything"
 
 
 @guard(tuple(FAR_OFF), AT_ONCE)

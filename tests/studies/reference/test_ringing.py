@@ -4,16 +4,14 @@ from functools import cache
 
 import numpy as np
 import pytest
-from scipy.sparse import block_array, csr_array, diags_array, eye_array
-from scipy.sparse.linalg import eigsh
 
 from massspring import Body, Clock, ImplicitVolume, Setup, step_limit
-from massspring.analysis.stiffness import stiffness_at_rest
 from reference_fem import exact
 from studies.meshing.scene_mesh import mesh_for
 from studies.runs.prepare import body_for
 from studies.runs.recipes import TetrahedralBody
 from studies.scene.library.ball_squeeze import BALL_SQUEEZE, RADIUS
+from tests.massspring.analysis.test_stability import natural_frequencies
 
 TISSUE = BALL_SQUEEZE.tissue
 UNIT = np.sqrt(TISSUE.shear_modulus / TISSUE.density) / RADIUS
@@ -28,35 +26,10 @@ def ball(law: str, volumes: str, nodes: int = NODES) -> Body:
     return body_for(BALL_SQUEEZE, recipe, mesh_for(BALL_SQUEEZE, nodes))
 
 
-SOFTNESS = 1e-10
-"""Relative compliance added to the kept volumes, so that the system is regular even if some depend on others."""
-
-
-def natural_frequencies(body: Body, count: int) -> np.ndarray:
-    """The `count` lowest ω [1/s], ascending: K u − Jᵀ p = ω² M u with J u = 0 for the volumes that are kept (eq. 5.5).
-
-    Six frequencies of a free body are 0.
-    """
-    n = 3 * body.node_count
-    stiffness = stiffness_at_rest(body)
-    mass = diags_array(np.repeat(body.moved_mass, 3))
-    level = float(stiffness.diagonal().mean())
-    gradients = body.kept.jacobian(body.rest)
-    gradients = gradients * (level / np.abs(gradients.data).mean())
-    m = body.kept.count
-    matrix = block_array([[stiffness, gradients.T], [gradients, -SOFTNESS * level * eye_array(m)]])
-    mass = block_array([[mass, None], [None, csr_array((m, m))]])
-    # Below all frequencies, near the lowest: that of a shear wave across the body.
-    shift = -level / float(body.moved_mass.mean()) * body.node_count ** (-2.0 / 3.0)
-    start = np.random.default_rng(0).standard_normal(n + m)
-    square = eigsh(matrix.tocsc(), count, M=mass.tocsc(), sigma=shift, v0=start, return_eigenvectors=False)
-    return np.sqrt(np.maximum(np.sort(square), 0.0))
-
-
 @cache
 def families(law: str, volumes: str, nodes: int = NODES) -> tuple[np.ndarray, np.ndarray]:
     """omega R/sqrt(mu/rho) of the five twisting and the five shape-changing modes."""
-    omega = natural_frequencies(ball(law, volumes, nodes), 16)[6:] / UNIT
+    omega = natural_frequencies(ball(law, volumes, nodes), 16)[0][6:] / UNIT
     return omega[:5], omega[5:]
 
 
