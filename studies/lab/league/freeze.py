@@ -16,9 +16,8 @@ from typing import Any
 from studies import BALL_CLAMPED, BALL_SQUEEZE, KIDNEY_PROBE, LIVER_PRESS, LIVER_PROBE, Scene, export
 from studies.exchange.league import FILE, SET
 from studies.lab.population.draw import member
-from studies.lab.references import write_file
 from studies.reference.load import load_reference
-from studies.reference.published import FOLDER, INDEX, physics
+from studies.reference.published import FOLDER, INDEX, physics, write_file
 from studies.reference.reference_solves import ReferenceSolve
 from studies.reference.solve import solve
 from studies.scene.as_json import scene_to_json
@@ -70,7 +69,7 @@ def held_back(organ: str, folder: Path) -> dict[str, Any]:
         solve(place / "solved", ReferenceSolve(scene))
         reference = load_reference(place / "solved", scene)
         assert reference is not None  # members have a plan
-        write_file(file, reference)
+        write_file(file, reference.record)
     digest = hashlib.sha256(file.read_bytes()).hexdigest()
     return {"reference": digest, "physics": physics(scene), "meshes": meshes_of(scene, LEAST.get(organ, 0))}
 
