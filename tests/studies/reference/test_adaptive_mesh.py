@@ -17,10 +17,9 @@ from studies.meshing.nested_mesh import edges_of, marked
 from studies.meshing.scene_mesh import mesh_for
 from studies.reference import adaptive_mesh as module
 from studies.reference.adaptive_mesh import STRAIN, adapted, adaptive_mesh, coarse_mesh, indicators_of, least_edge
-from studies.runs.case import Case, case_from_json
 from studies.runs.prepare import mesh_of
-from studies.runs.recipes import BODIES, QuadraticBody
-from studies.scene.library import BALL_CLAMPED, BALL_RINGING, BALL_SQUEEZE, LIVER_PROBE, SPLEEN_SAG
+from studies.runs.recipes import QuadraticBody
+from studies.scene.library import BALL_CLAMPED, BALL_RINGING, BALL_SQUEEZE, LIVER_PROBE
 
 NODES = 594
 BODY = QuadraticBody(NODES, graded="adaptive", mass="stiffness")
@@ -119,19 +118,6 @@ def test_elements_at_an_outline_stop_where_the_stretch_would_be_too_large():
         adapted(coarse, wished * (wished == 1.0), 10_000, 10.0)
 
 
-@pytest.mark.campaign
-def test_a_hanging_organ_is_adapted_and_large_strains_stop_it_at_its_outline(mesh_cache):
-    count = 494
-    organ_mesh, coarse = coarse_mesh(SPLEEN_SAG, count)
-    indicator, stretch = indicators_of(SPLEEN_SAG, organ_mesh, coarse)
-    least = least_edge(coarse, stretch)
-    size = np.linalg.norm(np.ptp(organ_mesh.points, axis=0))
-    assert 0.03 * size < least < 0.08 * size
-    assert mesh_of(SPLEEN_SAG, replace(BODY, nodes=count)).outer_count >= count
-    free, kept = (adapted(coarse, indicator, 2 * count, bound) for bound in (0.0, least))
-    assert len(kept.at_outlines()) < 0.95 * len(free.at_outlines())
-
-
 def test_a_coarse_mesh_that_loses_what_is_held_is_left_for_a_finer_one(monkeypatch):
     lost = {level: 20.0 for level in range(1000)}
     first = round((0.7 * NODES + 6) / 4)
@@ -162,15 +148,3 @@ def test_a_coarse_body_without_an_equilibrium_is_a_sentence(monkeypatch):
     organ_mesh, coarse = coarse_mesh(LIVER_PROBE, NODES)
     with pytest.raises(StudyError, match=r"no solution by which to adapt \(no step\); choose graded=True"):
         indicators_of(LIVER_PROBE, organ_mesh, coarse)
-
-
-@pytest.mark.parametrize("kind", ["tetrahedral", "surface"])
-def test_other_bodies_are_not_adapted(kind):
-    with pytest.raises(StudyError, match="graded"):
-        BODIES[kind](graded="adaptive")
-
-
-def test_a_recipe_is_stored_and_named():
-    case = Case(LIVER_PROBE, BODY)
-    assert case_from_json(case.key) == case and case.name.endswith("-adaptive-stiffness_mass")
-    assert BODY.series == "adaptive quadratic, masses by stiffness"

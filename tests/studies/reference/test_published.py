@@ -5,7 +5,6 @@ import json
 import shutil
 from dataclasses import replace
 
-import h5py
 import numpy as np
 import pytest
 
@@ -26,7 +25,7 @@ from studies.reference.published import (
     record_of,
     write_published,
 )
-from studies.reference.reference_solves import ReferenceSolve, reference_fingerprint
+from studies.reference.reference_solves import reference_fingerprint
 from studies.scene.library import BALL_SQUEEZE, JUDGED, LIVER_PRESS
 from studies.store.ledger import Ledger
 from studies.store.record import read_record
@@ -94,10 +93,11 @@ def test_titles_frames_names_and_plans_are_no_physics_and_the_rest_is():
     assert [published(scene) for scene in others] == [None] * len(others)
 
 
-def test_what_nobody_published_has_the_fingerprint_of_the_code():
+def test_what_nobody_published_has_the_fingerprint_of_the_code(tmp_path):
     assert published(SCENE) is None and fingerprint_of(SCENE) == reference_fingerprint()
     assert fingerprint_of(LIVER_PRESS) == f"published {published(LIVER_PRESS).sha256}"
     assert published(replace(LIVER_PRESS, reference=None)) is None
+    assert published(LIVER_PRESS, tmp_path) is None  # a folder without a set
 
 
 def test_a_sweep_copies_it_and_solves_nothing(tmp_path, monkeypatch):
@@ -139,10 +139,6 @@ def test_one_that_is_published_again_leaves_the_others_as_they_are(copied):
     assert [published(scene, copied).name for scene in JUDGED] == ["2027.2"] * len(JUDGED)
 
 
-def test_a_folder_without_a_set_has_no_references(tmp_path):
-    assert published(LIVER_PRESS, tmp_path) is None
-
-
 def test_a_file_that_fits_its_digest_and_is_no_reference_is_refused(copied):
     data = json.loads((copied / INDEX).read_text())
     file = copied / "liver_press.h5"
@@ -179,14 +175,3 @@ def test_a_reference_that_is_three_per_cent_off_is_beyond_both_bars(tmp_path):
     apart = softer.apart(reference)
     assert [name for name, (off, allowed) in apart.items() if not off <= allowed] == ["force", "force_end"]
     assert apart["force"][0] == pytest.approx(0.03 / 1.03, rel=0.1)
-
-
-def test_the_files_are_plain_hdf5():
-    with h5py.File(FOLDER / "liver_press.h5") as file:
-        assert file["displacement"].dtype == np.float32
-        assert file.attrs["unknowns"] > 50_000
-
-
-def test_a_solve_of_another_scene_key_is_not_mixed_up(tmp_path):
-    other = replace(LIVER_PRESS, reference=replace(LIVER_PRESS.reference, most=5e3))
-    assert ReferenceSolve(other).path(tmp_path) != ReferenceSolve(LIVER_PRESS).path(tmp_path)

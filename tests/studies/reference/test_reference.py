@@ -1,23 +1,19 @@
 """The reference, from an octant solved on three very coarse meshes: right, whole, with an error bar."""
 
 from dataclasses import replace
-from types import SimpleNamespace
-from typing import cast
 
 import numpy as np
 import pytest
 
-from studies.base.errors import StudyError
 from studies.geometry.mesh.organ_mesh import signed_volume
 from studies.geometry.surface.distance import hausdorff
-from studies.reference.load import Reference, load_reference
+from studies.reference.load import load_reference
 from studies.reference.problem import whole_forces
 from studies.reference.reference_solves import ReferenceSolve
 from studies.reference.solve import solve
-from studies.reference.uncertainty import QUANTITIES, uncertainties
-from studies.report.references import shape_of_reference, uncertainty_table
+from studies.reference.uncertainty import QUANTITIES
+from studies.report.references import uncertainty_table
 from studies.scene.library import ReferencePlan
-from studies.scene.library.ball_incised import BALL_INCISED
 from tests.studies.octant import SCENE
 
 RADIUS, SHEAR = 0.05, SCENE.tissue.shear_modulus
@@ -80,14 +76,6 @@ def test_the_table_of_references_tells_how_far_the_finest_mesh_is_from_the_true_
     assert 0 < distance < 0.5 and -0.3 < volume < 0
 
 
-def test_faces_of_a_cut_are_not_compared_with_the_true_shape(reference):
-    """They belong to the boundary and lie up to a third of the size inside the organ."""
-    scene = SimpleNamespace(organ=reference.scene.organ, cuts=BALL_INCISED.cuts)  # an octant cannot be cut
-    cut = cast(Reference, SimpleNamespace(scene=scene, boundary=reference.boundary))
-    assert np.isnan(shape_of_reference(cut).distance)
-    assert shape_of_reference(cut).volume == shape_of_reference(reference).volume
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "levels", [(0.6, 0.5, 0.4), (0.5, 0.4, 0.32), pytest.param((0.4, 0.32, 0.25), marks=pytest.mark.campaign)]
@@ -103,22 +91,6 @@ def test_the_error_bar_covers_the_true_error_and_is_not_idle(tmp_path, levels):
         assert true < reference.total_uncertainty[name] + ORACLE < 20 * (true + ORACLE), name
 
 
-def test_a_shift_is_reported_and_not_applied(reference):
-    """The force that is compared with is that of the finest mesh."""
-    bar = reference.uncertainty["force_end"]
-    contact, held = reference.field("contact_force"), reference.field("held_force")
-    assert reference.force[-1] == reference.scene.output_force(contact, held)[-1]
-    assert abs(bar.shift) <= bar.shares["mesh"]
-
-
-def test_two_meshes_have_a_larger_bar_and_one_has_none(reference):
-    pair = uncertainties(SCENE, reference.at, reference.meshes[:2], reference.variants)
-    assert pair["force"].total > 0
-    assert pair["silhouette"].shares["mesh"] > reference.uncertainty["silhouette"].shares["mesh"]
-    with pytest.raises(StudyError, match="one mesh only"):
-        uncertainties(SCENE, reference.at, reference.meshes[:1], {})
-
-
 def test_displacement_is_mirrored(reference):
     points = RADIUS * np.random.default_rng(3).uniform(0.05, 0.55, (40, 3))
     truth = reference.displacement(points)
@@ -128,12 +100,6 @@ def test_displacement_is_mirrored(reference):
     axis = reference.displacement(np.array([[0.0, 0.0, 0.5 * RADIUS]]))
     assert np.abs(axis[0, :2]).max() < 1e-9
     assert axis[0, 2] < 0
-
-
-def test_displacement_at_a_node_is_the_stored_one(reference):
-    nodes, stored = reference.field("nodes")[:50], reference.field("displacement")[:, :50]
-    np.testing.assert_allclose(reference.displacement(nodes), stored[-1], rtol=0, atol=1e-9 * RADIUS)
-    np.testing.assert_allclose(reference.displacements(nodes), stored, rtol=0, atol=1e-9 * RADIUS)
 
 
 def test_surface_is_whole_and_outward(reference):
@@ -159,9 +125,3 @@ def test_whole_forces_mirror_and_multiply(reference):
     np.testing.assert_array_equal(whole[:, 1], [[0, 0, 12], [0, 0, 20]])
     solid = replace(SCENE, reference=ReferencePlan())
     np.testing.assert_array_equal(whole_forces(solid, octant), octant)
-
-
-def test_both_planes_are_felt(reference):
-    contact = reference.field("contact_force")
-    np.testing.assert_array_equal(contact[:, 0], -contact[:, 1])
-    np.testing.assert_array_equal(reference.force, -contact[:, 0, 2])

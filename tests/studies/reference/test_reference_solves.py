@@ -5,7 +5,6 @@ import shutil
 from dataclasses import replace
 
 import numpy as np
-import pandas as pd
 import pytest
 
 from reference_fem import SolveError
@@ -14,17 +13,14 @@ from studies.reference import solve as module
 from studies.reference.load import load_reference
 from studies.reference.reference_solves import ReferenceSolve, reference_solves, settings_varied
 from studies.reference.solve import solve
-from studies.report.references import refresh_uncertainty
 from studies.scene.as_json import scene_from_dict, scene_to_json
 from studies.scene.library import SCENES, ReferencePlan
 from studies.scene.library.ball_clamped import BALL_CLAMPED
 from studies.store.ledger import Ledger
-from studies.store.paths import key_digest
 from studies.store.record import Status, read_record
 from studies.sweep import job as jobs_module
 from studies.sweep.job import reference_jobs
-from studies.sweep.load import References, load_runs
-from studies.sweep.standings import standing_of
+from studies.sweep.load import load_runs
 from tests.studies.octant import SCENE
 from tests.studies.tiny import tiny_case, tiny_study
 
@@ -36,10 +32,12 @@ def is_current(root, scene):
 
 def test_current_until_the_load_the_plan_or_the_code_changes(solved, monkeypatch):
     assert is_current(solved, SCENE)
+    assert load_reference(solved, replace(SCENE, reference=None)) is None
     assert is_current(solved, replace(SCENE, damping=1.0, frames=7, title="another", quantities=("volume",)))
     for changes in (
         {"gravity": (0.0, 0.0, -9.81)},
         {"checkpoints": (1.0, 3.9)},
+        {"name": "other"},
         {"reference": ReferencePlan("octant", (0.5, 0.4))},
         {"reference": replace(SCENE.reference, variants=("kappa",))},
     ):
@@ -84,45 +82,6 @@ def test_a_reference_holds_its_meshes_and_the_settings_made_better(reference):
     assert reference.at.symmetric and len(reference.at.points) < len(reference.field("nodes"))
 
 
-def standing(root):
-    (job,) = reference_jobs(root, [SCENE])
-    return standing_of(Ledger(root), job)
-
-
-def test_listing_says_how_a_reference_stands(solved, tmp_path, monkeypatch):
-    whole = standing(solved)
-    assert whole.status == "ok" and whole.entry.unknowns > 1000 and whole.entry.seconds > 0
-    assert standing(tmp_path).status == "missing" and standing(tmp_path).entry is None
-    damaged = shutil.copytree(solved, tmp_path / "results")
-    path = ReferenceSolve(SCENE).path(damaged)
-    path.write_bytes(path.read_bytes()[:500])
-    assert (standing(damaged).status, standing(damaged).message) == ("stale", "its file is damaged")
-    monkeypatch.setattr(jobs_module, "fingerprint_of", lambda scene: "other")
-    assert standing(solved).status == "stale"
-
-
-def test_error_bars_are_written_once_and_again_when_a_reference_changes(solved, tmp_path, reference):
-    root = shutil.copytree(solved, tmp_path / "results")
-    table, chart = refresh_uncertainty(
-        References(Ledger(root)), [SCENE, SCENE, replace(SCENE, name="bare", reference=None)]
-    )
-    rows = pd.read_csv(table)
-    assert rows["quantity"].tolist() == list(reference.total_uncertainty)
-    shares = rows[["mesh [%]", "steps [%]", "contact [%]", "kappa [%]"]].to_numpy()
-    np.testing.assert_allclose(np.linalg.norm(shares, axis=1), rows["uncertainty [%]"], rtol=1e-5)
-    assert rows["uncertainty [%]"][0] == pytest.approx(100 * reference.total_uncertainty["force"], rel=1e-5)
-    assert set(rows["meshes"]) == {3}
-    assert chart.read_bytes()[:4] == b"\x89PNG"
-    chart.write_bytes(b"old")
-    refresh_uncertainty(References(Ledger(root)), [SCENE])
-    assert chart.read_bytes() == b"old"
-    path = ReferenceSolve(SCENE).path(root)
-    path.write_bytes(path.read_bytes())
-    refresh_uncertainty(References(Ledger(root)), [SCENE])
-    assert chart.read_bytes()[:4] == b"\x89PNG"
-    assert refresh_uncertainty(References(Ledger(tmp_path / "empty")), [SCENE]) == []
-
-
 FOLDS = "the mesh folds; refine it"
 
 
@@ -154,13 +113,6 @@ def test_a_path_that_breaks_off_is_stored_and_not_believed(tmp_path, monkeypatch
         load_reference(tmp_path, SCENE)
 
 
-def test_a_path_that_breaks_off_at_once_is_stored_too(tmp_path, monkeypatch):
-    breaks(monkeypatch, number=0, reached=0)
-    record = read_record(solve(tmp_path, ReferenceSolve(SCENE)))
-    assert (record.status, record.message) == (Status.NOT_CONVERGED, f"on mesh 0.5: {FOLDS}")
-    assert np.isnan(record.fields["contact_force"].values).all()
-
-
 def test_a_better_setting_that_breaks_off_is_named(tmp_path, monkeypatch):
     plan = ReferencePlan("octant", (0.9, 0.5), variants=("kappa",))
     breaks(monkeypatch, number=2, reached=0)
@@ -185,10 +137,6 @@ def test_runs_are_loaded_without_a_reference_that_failed(solved, tmp_path, mesh_
     assert FOLDS in remarks[0]
     job.path.unlink()
     assert "no results file" in load_runs(root, study)[1][0]
-
-
-def test_no_plan_no_reference(tmp_path):
-    assert load_reference(tmp_path, replace(SCENE, reference=None)) is None
 
 
 @pytest.mark.parametrize(
@@ -221,8 +169,3 @@ def test_a_quick_look_has_fewer_unknowns_and_no_better_settings():
     assert not octant.nested and (octant.levels, octant.variants) == ((0.5, 0.4), ())
     moving = ReferencePlan(levels=(200, 300, 400), dt=0.1).smaller()
     assert not moving.nested and (moving.levels, moving.dt) == ((200, 300), 0.1)
-
-
-def test_keys_tell_scenes_apart_that_differ_in_their_physics_alone():
-    assert key_digest(ReferenceSolve(replace(SCENE, title="other")).key) == key_digest(ReferenceSolve(SCENE).key)
-    assert key_digest(ReferenceSolve(replace(SCENE, name="other")).key) != key_digest(ReferenceSolve(SCENE).key)

@@ -7,9 +7,6 @@ import numpy as np
 import pytest
 
 from reference_fem import facet_nodes, nodes
-from studies.geometry.mesh.quality import curved_volume
-from studies.geometry.shape.levelset import project
-from studies.meshing.graded_mesh import mesh_at
 from studies.meshing.reference_mesh import reference_mesh
 from studies.meshing.scene_mesh import mesh_for
 from studies.meshing.true_shape import true_shape
@@ -49,26 +46,6 @@ def shape(scene):
     return true_shape(scene.organ)
 
 
-@pytest.mark.campaign
-def test_the_curved_body_has_the_volume_of_the_surface(scene):
-    """A polyhedron with 100 nodes on the ball would be 6 % smaller."""
-    mesh = mesh_at(scene, LEVEL, 0, 0, True)
-    assert mesh.volume == pytest.approx(VOLUME, rel=1e-3)
-    assert curved_volume(mesh.points, mesh.cells) == mesh.volume
-    flat = mesh_for(scene, LEVEL, on_shape=True)
-    assert flat.volume < 0.97 * VOLUME
-
-
-@pytest.mark.campaign
-def test_a_graded_quadratic_body_is_on_the_same_shape(scene, shape):
-    """Halved elements too: their nodes and mid-side nodes lie on the shape, those of outlines on the outline."""
-    mesh = mesh_at(scene, LEVEL, 1, 0, True)
-    assert np.abs(shape.level(mesh.points[: mesh.outer_count])).max() < 1e-3 * RADIUS
-    assert mesh.volume == pytest.approx(VOLUME, rel=2e-3) and mesh.smallest_jacobian > 0
-    rim = np.abs(np.abs(mesh.points[mesh.patches["top"], 2]) - CAP * RADIUS) < 1e-9
-    assert rim.sum() >= 12
-
-
 def test_sides_follow_the_true_shape_and_outlines_the_true_outline(scene, shape):
     mesh, patches, _ = reference_mesh(scene, LEVEL)
     points = nodes(mesh)
@@ -79,17 +56,6 @@ def test_sides_follow_the_true_shape_and_outlines_the_true_outline(scene, shape)
     assert np.abs(shape.level(points[outer])).max() < 1e-9 * RADIUS
     for patch in patches:
         assert (np.abs(points[patch, 2]) >= CAP * RADIUS * (1 - 1e-9)).all()
-
-
-@pytest.mark.campaign
-def test_all_meshes_have_one_shape(scene, shape, mesh_cache):
-    """Nodes of one are on the shape of the other; the grid of the shape is stored once."""
-    for level in (LEVEL, 150):
-        mesh = mesh_for(scene, level, on_shape=True)
-        on = mesh.points[: mesh.surface_count]
-        assert np.abs(project(shape, on) - on).max() < 1e-9 * RADIUS
-        assert abs(mesh.surface_count / level - 1) < 0.05
-    assert len(list(mesh_cache.glob("ball-*.npz"))) >= 3
 
 
 def test_the_size_is_that_of_the_mesh_that_is_curved(scene):

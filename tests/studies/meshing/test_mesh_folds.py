@@ -10,7 +10,6 @@ from skfem.refdom import RefTet
 
 from reference_fem import SolveError, facet_nodes, nodes
 from reference_fem.elements.shapes import build_elements, check_neighbours, element_nodes
-from studies.base.errors import StudyError
 from studies.geometry import curved
 from studies.geometry.mesh.quality import curved_volume
 from studies.lab.population.draw import member
@@ -37,16 +36,6 @@ def curved_sides(scene, level):
     body = coarse.refined(scene, *HALVED[level])
     bent = on_true_shape(curved(organ_mesh, may_fold=True), coarse, true_shape(scene.organ), scene.held)
     return on_true_sides(scene, organ_mesh, coarse, body), as_curved(body, coarse, bent), upright_cells(body)
-
-
-@pytest.mark.campaign
-def test_a_mesh_that_only_the_mesher_s_bound_refuses_is_taken():
-    with pytest.raises(StudyError, match="fold when they follow"):
-        curved(mesh_for(STRICT, 370))
-    mesh, held, _ = reference_mesh(STRICT, 370)
-    build_elements(mesh, 5)
-    check_neighbours(mesh)
-    assert len(held[0])
 
 
 @pytest.mark.parametrize("number", [16, *(pytest.param(n, marks=pytest.mark.campaign) for n in (12, 19, 39))])

@@ -8,19 +8,15 @@ from skfem import ElementTetP2, MeshTet, MeshTet2
 from skfem.quadrature import get_quadrature
 from skfem.refdom import RefTet
 
-from reference_fem import NewtonSettings, facet_nodes, nodes
+from reference_fem import facet_nodes, nodes
 from reference_fem.elements.shapes import basis_table, element_nodes
-from reference_fem.model.problem import find_held
-from reference_fem.system.saddle_point import System
 from studies.meshing.held_mesh import rim_sides, with_patches
-from studies.meshing.nested_mesh import SHARE, base_mesh
+from studies.meshing.nested_mesh import SHARE
 from studies.meshing.outlines import drawn_middles
 from studies.meshing.reference_mesh import reference_mesh
-from studies.reference.nested import problem_of
 from studies.reference.solve import element_size
 from studies.scene.library.ball_clamped import BALL_CLAMPED, CAP, RADIUS
 from studies.scene.library.ball_squeeze import BALL_SQUEEZE
-from studies.scene.library.liver_probe import LIVER_PROBE
 from tests.studies.tiny import cube
 
 LEVEL, LIVER_LEVEL = 150, 200
@@ -55,27 +51,6 @@ def test_outline_is_closed_and_on_the_edge_of_the_region(mesh_cache):
     _, count = np.unique(sides[:, :2], return_counts=True)
     assert (count == 2).all()
     np.testing.assert_allclose(nodes(mesh)[sides][..., 2], -CAP * RADIUS, rtol=1e-9)
-
-
-@pytest.mark.campaign
-def test_a_base_is_finer_where_the_probe_will_be_upright_and_still_held(mesh_cache):
-    """Moving each new node onto the surface by itself folds elements; the solver refuses such a mesh."""
-    sphere = LIVER_PROBE.obstacles[0]
-    deepest = np.asarray(sphere.centre) + sphere.path(LIVER_PROBE.checkpoints[-1])
-
-    def near(mesh):
-        away = np.linalg.norm(mesh.points - deepest, axis=1)
-        return (away < sphere.radius).sum(), (away > 2.5 * sphere.radius).sum()
-
-    even, fine, finest = (base_mesh(LIVER_PROBE, LIVER_LEVEL, times) for times in (0, 3, 5))
-    (inside, outside), (more_inside, more_outside) = near(even), near(fine)
-    assert more_inside > 3 * inside
-    assert more_outside < 1.3 * outside
-    assert finest.mesh.nelements > 1.2 * even.mesh.nelements
-    before, after = problem_of(even), problem_of(finest)
-    System(after, NewtonSettings()).solver.release()
-    for one, other in zip(find_held(before), find_held(after), strict=True):
-        assert len(other.nodes) >= len(one.nodes)
 
 
 def test_a_body_from_a_file_keeps_its_own_outline():
