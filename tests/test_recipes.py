@@ -35,9 +35,9 @@ from tests.massspring import rows
 from tests.massspring.body import test_laws
 from tests.massspring.conftest import SOFT, ball_body, block, block_body, body_of, hollow_body  # noqa: F401
 from tests.massspring.methods import test_capabilities, test_methods
-from tests.plots import test_contract
 from tests.studies.catalog import test_catalog, test_metrics, test_scenes
 from tests.studies.geometry.organs import test_shapes
+from tests.studies.plots import test_contract
 from tests.studies.tiny import Silent
 from tests.test_docs import code
 

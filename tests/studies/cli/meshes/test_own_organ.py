@@ -20,7 +20,7 @@ from studies.scene.tissues import SPLEEN
 from studies.tools.advise.answer import advise
 from studies.tools.advise.campaign import shipped
 from tests.studies.geometry.boxes import box, together
-from tests.studies.page.unpack import unpack_frames
+from tests.studies.report.page.unpack import unpack_frames
 
 PAGE = Path(__file__).parents[4] / "docs" / "own-organ.md"
 COMMANDS = re.findall(r"^    organbench (.+)$", PAGE.read_text(encoding="utf-8"), re.MULTILINE)

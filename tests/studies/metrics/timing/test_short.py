@@ -11,7 +11,7 @@ from studies.metrics.timing.short import ShortTiming, short_timing
 from studies.scene.library import LIVER_PRESS
 from studies.tools.advise import answer as answers
 from studies.tools.advise.answer import advise
-from tests.plots.made_up import frame_ns
+from tests.studies.plots.made_up import frame_ns
 from tests.studies.tiny import FRAMES, tiny_case
 from tests.studies.tools.advise.made_up_campaign import GRADED, publish, rows_of
 

@@ -25,7 +25,7 @@ from studies.store.tables import write_table
 from studies.tools.advise import answer as answers
 from studies.tools.advise.answer import advise, recommended
 from studies.tools.advise.words import lines_of
-from tests.plots.made_up import run
+from tests.studies.plots.made_up import run
 from tests.studies.tools.advise.made_up_campaign import EVEN, FINE, GRADED, LADDER, ONE, PAPER, publish, row, rows_of
 
 NAN = float("nan")

@@ -16,7 +16,7 @@ from studies.plots import volume_history
 from studies.plots.style.page import finish, page, spread_out
 from studies.plots.style.render import LIGHT, Camera, draw_surface, shade, uniform, vertex_normals
 from studies.plots.style.style import method_colour, save, styled
-from tests.plots.made_up import POINTS, RADIUS, TRIANGLES, run
+from tests.studies.plots.made_up import POINTS, RADIUS, TRIANGLES, run
 
 FRONT = Camera(azimuth=-90.0, elevation=0.0)
 

@@ -8,7 +8,7 @@ from massspring import Free
 from studies.meshing.true_surface import ShapeErrors
 from studies.report.page.best import HEADS, answers, best_bodies, joined_best, own_first, scene_rows
 from studies.scene.library import BALL_CLAMPED, LIVER_PRESS
-from tests.plots.made_up import run
+from tests.studies.plots.made_up import run
 
 
 def named(made):

@@ -19,7 +19,7 @@ from studies.runs.case import Case
 from studies.scene.library import BALL_CLAMPED, BALL_SQUEEZE
 from studies.store.machine import write_machine
 from studies.store.record import Field, Status
-from tests.plots.made_up import FRAMES, POINTS, run
+from tests.studies.plots.made_up import FRAMES, POINTS, run
 
 NASTY = '</script><img src=x onerror=alert(1)> & "quoted"'
 MOMENTS = np.arange(0, FRAMES + 1, 2)

@@ -8,7 +8,7 @@ from studies.geometry import HalfSpace, OrganMesh, organ
 from studies.geometry.shape.regions import region_to_dict
 from studies.plots.figures import organ_springs, organs
 from studies.plots.style.cut import cut_face, cut_surface
-from tests.plots.made_up import CELLS, POINTS, RADIUS, TRIANGLES, VOLUME
+from tests.studies.plots.made_up import CELLS, POINTS, RADIUS, TRIANGLES, VOLUME
 
 CAP = {"top_cap": region_to_dict(HalfSpace((0.0, 0.0, 0.02), (0.0, 0.0, -1.0)))}
 

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.studies.page.made_up_page import NASTY
-from tests.studies.page.seen import column, pixels
+from tests.studies.report.page.made_up_page import NASTY
+from tests.studies.report.page.seen import column, pixels
 
 CONTRAST = 4.5
 RATIOS = (Path(__file__).parent / "contrast.js").read_text(encoding="utf-8")

@@ -4,7 +4,7 @@ import shutil
 
 import pytest
 
-from tests.studies.page.made_up_page import made_up_page
+from tests.studies.report.page.made_up_page import made_up_page
 
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 FLAGS = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]

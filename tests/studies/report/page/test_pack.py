@@ -6,7 +6,7 @@ import pytest
 from massspring import Capsule, Plane, Sphere, Trajectory
 from studies.report.page.case_data import BINS, obstacle_of, thinned
 from studies.report.page.pack import pack_frames, pack_series
-from tests.studies.page.unpack import unpack_frames, unpack_series
+from tests.studies.report.page.unpack import unpack_frames, unpack_series
 
 RANDOM = np.random.default_rng(5)
 PROMISED = 1e-4

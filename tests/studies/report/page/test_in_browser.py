@@ -6,8 +6,8 @@ import json
 import numpy as np
 import pytest
 
-from tests.studies.page.seen import column, pixels
-from tests.studies.page.unpack import unpack_frames, unpack_series
+from tests.studies.report.page.seen import column, pixels
+from tests.studies.report.page.unpack import unpack_frames, unpack_series
 
 FIRST_PICTURE = 2.0
 """[s]."""

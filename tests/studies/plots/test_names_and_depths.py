@@ -12,7 +12,7 @@ from studies.plots.style.style import method_label
 from studies.runs.case import Case
 from studies.scene.library import BALL_CLAMPED, LIVER_PRESS, LIVER_PROBE
 from studies.scene.library.ball_squeeze import BALL_SQUEEZE
-from tests.plots.made_up import run
+from tests.studies.plots.made_up import run
 
 
 def title(scene, nodes):

@@ -12,7 +12,7 @@ from studies.reference.published import published
 from studies.report.league import COST, COUNT, HEADS, cards, engines, page, pairs, profile, profiles, tolerance
 from studies.report.page.write import write_page
 from studies.scene.library import LIVER_PRESS
-from tests.studies.page.made_up_page import made_up_parts
+from tests.studies.report.page.made_up_page import made_up_parts
 
 NAN = float("nan")
 

@@ -8,8 +8,8 @@ import pytest
 
 from studies.report.page import write as module
 from studies.report.page.write import write_page
-from tests.studies.page.made_up_page import made_up_parts
-from tests.studies.page.seen import until
+from tests.studies.report.page.made_up_page import made_up_parts
+from tests.studies.report.page.seen import until
 
 
 def ids(page) -> list[str]:

@@ -9,8 +9,8 @@ from studies.plots import cost_ratio, frame_time, squeeze
 from studies.plots.campaigns import stability
 from studies.plots.style.style import BLACK, BLUE, GREY, STATUS_LOOKS, VERMILLION
 from studies.store.record import Status
-from tests.plots.made_up import FRAMES, frame_ns, run, stability_grid
-from tests.plots.reading import lines, points, words
+from tests.studies.plots.made_up import FRAMES, frame_ns, run, stability_grid
+from tests.studies.plots.reading import lines, points, words
 
 
 def test_frame_times_with_deadlines_and_percentiles():

@@ -14,8 +14,8 @@ from studies.plots.style.bodies import body_looks
 from studies.plots.style.style import BLACK, BODY_LOOKS, SPARE_LOOKS, VERMILLION, method_colour, styled
 from studies.runs.recipes import VIRTUAL
 from studies.scene.library.stomach_press import STOMACH_PRESS
-from tests.plots.made_up import run
-from tests.plots.reading import words
+from tests.studies.plots.made_up import run
+from tests.studies.plots.reading import words
 
 RECIPES = [
     *(

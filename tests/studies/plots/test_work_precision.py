@@ -16,8 +16,8 @@ from studies.scene.library.ball_clamped import BALL_CLAMPED
 from studies.scene.library.ball_squeeze import BALL_SQUEEZE
 from studies.scene.library.liver_press import LIVER_PRESS
 from studies.store.record import Status
-from tests.plots.made_up import FRAMES, UNCERTAINTY, run
-from tests.plots.reading import words
+from tests.studies.plots.made_up import FRAMES, UNCERTAINTY, run
+from tests.studies.plots.reading import words
 
 FRAME_MS = 1e3 * BALL_CLAMPED.duration / FRAMES
 """Of a run in real time, but for the middle one of five repeats, which is 1.02 times as slow."""

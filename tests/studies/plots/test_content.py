@@ -15,8 +15,8 @@ from studies.reference.uncertainty import Uncertainty
 from studies.scene.library.ball_clamped import BALL_CLAMPED
 from studies.scene.library.ball_squeeze import BALL_SQUEEZE
 from studies.store.record import Status
-from tests.plots.made_up import FRAMES, UNCERTAINTY, run
-from tests.plots.reading import lines, points, words
+from tests.studies.plots.made_up import FRAMES, UNCERTAINTY, run
+from tests.studies.plots.reading import lines, points, words
 
 
 def test_volume_in_per_cent_and_its_size_below():

@@ -17,8 +17,8 @@ from studies.plots.campaigns import stability
 from studies.plots.style.style import DPI, SMALL, styled
 from studies.store.record import Status
 from tests.campaigns import campaigns_but
-from tests.plots.made_up import grid, laws_grid, run, stability_grid, timed_grid, without_reference
-from tests.plots.test_bodies import RECIPES
+from tests.studies.plots.made_up import grid, laws_grid, run, stability_grid, timed_grid, without_reference
+from tests.studies.plots.test_bodies import RECIPES
 
 OWN = {stability: stability_grid, laws: laws_grid}
 """Charts whose axes the plain grids do not fill."""

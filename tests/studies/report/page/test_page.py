@@ -23,9 +23,9 @@ from studies.report.page.svg import inline
 from studies.report.page.write import ASSETS, SCRIPTS, write_page
 from studies.report.results import draw_charts, report
 from studies.store.ledger import Ledger
-from tests.plots.made_up import POINTS, STRETCH
-from tests.studies.page.made_up_page import COLUMNS, HELD, MOMENTS, NASTY, losses, made_up_parts, rates, theirs
-from tests.studies.page.unpack import unpack_frames, unpack_series
+from tests.studies.plots.made_up import POINTS, STRETCH
+from tests.studies.report.page.made_up_page import COLUMNS, HELD, MOMENTS, NASTY, losses, made_up_parts, rates, theirs
+from tests.studies.report.page.unpack import unpack_frames, unpack_series
 from tests.studies.tiny import tiny_study
 
 VOID = {"meta", "link", "input", "br", "img"}
