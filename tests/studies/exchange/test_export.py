@@ -6,6 +6,7 @@ import re
 import shutil
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import meshio
 import numpy as np
@@ -14,7 +15,7 @@ import pytest
 
 from massspring import Capsule, Probe
 from studies.exchange.description import description, judged_metrics
-from studies.exchange.export import DIGITS, export, paths_table, rounded
+from studies.exchange.export import DIGITS, export, marks, paths_table, rounded
 from studies.exchange.words import obstacle_words
 from studies.runs.recipe_text import body_words
 from studies.scene.library import CUT, SCENES
@@ -158,15 +159,13 @@ def test_words_of_obstacles_tell_shape_friction_and_path():
     assert all(words in obstacle_words(obstacle) for words, obstacle in OBSTACLES.items())
 
 
-OWN = "from dataclasses import replace\nfrom studies import BALL_SQUEEZE\nSCENE = replace(BALL_SQUEEZE, name='mine')\n"
-
-
-def test_a_scene_of_one_s_own_is_exported_too(organbench, tmp_path, mesh_cache):
-    path = tmp_path / "mine.py"
-    path.write_text(OWN)
-    code, _, err = organbench("export", path, "-o", tmp_path / "out", "--nodes", NODES)
-    assert code == 0, err
-    assert json.loads((tmp_path / "out" / "scene.json").read_text())["name"] == "mine"
+def test_nodes_of_the_surface_of_a_lumen_are_marked():
+    wall = SimpleNamespace(hollow=True, outer_count=3, surface_count=5)
+    found = marks(SimpleNamespace(points=np.zeros((7, 3)), mesh=wall, held_nodes=dict))
+    assert {name: np.flatnonzero(values).tolist() for name, values in found.items()} == {
+        "outer": [0, 1, 2],
+        "lumen": [3, 4],
+    }
 
 
 REFUSED = {
