@@ -171,12 +171,6 @@ def test_shares_add_as_independent_ones():
     assert combined({}) == 0.0
 
 
-def test_the_bar_is_as_wide_as_the_theory_says():
-    """Eq. 6.3: 1.25 times the change left; twice the spread where values go to and fro."""
-    assert mesh_error(SIZES, law(2.0)).uncertainty == pytest.approx(1.25 * 0.3, rel=1e-9)
-    assert mesh_error(SIZES, [7.0, 7.2, 6.9]).uncertainty == pytest.approx(2 * 0.3, rel=1e-9)
-
-
 UNKNOWNS = (40e3, 15e3, 6e3)
 """Of nested meshes, fine to coarse; of different ratio."""
 

@@ -17,7 +17,6 @@ from reference_fem import (
     equilibrium_path,
     exact,
     motion_path,
-    natural_frequencies,
     nodes,
 )
 from reference_fem.contact.augmented import misplacement, penetration, touch
@@ -30,39 +29,25 @@ MATERIAL = NeoHookean(1.0, 5000.0)
 
 @pytest.fixture(scope="module")
 def rung():
-    """A ball pressed flat by 1 % between two planes, and let go: two swings in 72 steps each."""
+    """A ball pressed flat by 1 % between two planes, and let go: a swing in 72 steps."""
     mesh = ball_octant(3, grade=1.0, radial=0.0)
     plane = RigidPlane((0.0, 0.0, 1.0), (0.0, 0.0, -1.0), lambda t: (0.0, 0.0, -t))
     pressed = equilibrium_path(Problem(mesh, MATERIAL, symmetry(), [plane]), [0.01])[0]
     problem = Problem(mesh, MATERIAL, symmetry(), density=1.0)
-    times = np.linspace(0.0, 2.0 * 2.0 * np.pi / exact.ball_spheroidal(0.5), 145)
-    return problem, pressed, motion_path(problem, times, start=pressed)
-
-
-@pytest.mark.slow
-def test_a_released_ball_rings_at_its_frequency(rung):
-    """The part of the motion in the two n = 2 modes swings at Lamb's frequency: 0.5 %, of which the steps take 0.1."""
-    problem, _, path = rung
-    shapes, mass = natural_frequencies(problem, 2).shapes, MovingSystem(problem, NewtonSettings()).mass
-    swing = np.array([[np.sum(shape * mass.times(m.u)) for shape in shapes] for m in path])
-    swing = swing @ swing[0]
-    t = np.array([m.t for m in path])
-    down = np.flatnonzero((swing[:-1] > 0.0) != (swing[1:] > 0.0))
-    zeros = t[down] - swing[down] * np.diff(t)[down] / (swing[down + 1] - swing[down])
-    assert len(zeros) == 4
-    assert np.pi / np.diff(zeros).mean() == pytest.approx(exact.ball_spheroidal(0.5), rel=5e-3)
+    times = np.linspace(0.0, 2.0 * np.pi / exact.ball_spheroidal(0.5), 73)
+    return pressed, motion_path(problem, times, start=pressed)
 
 
 @pytest.mark.slow
 def test_a_release_starts_where_it_was_held_and_gains_nothing(rung):
     """Contact was at a point: what the mesh cannot swing is damped, 1 % of the energy a swing."""
-    _, pressed, path = rung
+    pressed, path = rung
     np.testing.assert_array_equal(path[0].u, pressed.u)
     assert not path[0].v.any()
     assert path[0].energy == pytest.approx(pressed.energy, rel=1e-3)
     total = [m.kinetic + m.energy for m in path]
     assert max(total) < (1.0 + 1e-3) * pressed.energy
-    assert total[-1] > 0.96 * pressed.energy
+    assert total[-1] > 0.98 * pressed.energy
     assert max(abs(m.volume / m.volume0 - 1.0) for m in path) < 1e-5
 
 
@@ -99,13 +84,6 @@ def test_a_bounce_keeps_the_energy(bounced):
     assert max(m.balance for m in path) < 1e-3 * path[0].kinetic
     assert path[-1].balance > -0.04 * path[0].kinetic
     assert path[-1].work == pytest.approx(0.0, abs=1e-12)
-
-
-@pytest.mark.slow
-def test_contact_does_not_sink_in(bounced):
-    """Within a thousandth of the largest displacement."""
-    for moment in bounced[1]:
-        assert moment.penetration <= 1e-3 * np.abs(moment.u).max()
 
 
 def test_a_point_on_its_way_out_is_out_of_place():
@@ -164,13 +142,7 @@ def test_holders_carry_inertia_and_damping():
     assert errors[1] < 1e-3 * abs(force)
     assert np.log2(errors[0] / errors[1]) == pytest.approx(2.0, abs=0.1)
     np.testing.assert_allclose(fine.reaction.sum(axis=0), fine.held_force[0], atol=1e-12)
-
-
-def test_work_of_the_holders_is_kinetic_energy_and_damping():
-    """To second order in the step: a quarter of the misfit at half the step."""
-    coarse, fine = (shaken(steps)[0] for steps in (50, 100))
     assert abs(fine.balance) < 2e-3 * fine.work
-    assert np.log2(abs(coarse.balance / fine.balance)) == pytest.approx(2.0, abs=0.1)
 
 
 def test_a_prescribed_motion_with_a_kink_does_not_ring():
@@ -196,17 +168,6 @@ def test_a_hollow_body_in_motion_keeps_its_content():
     assert max(abs(m.cavity_pressure[0]) for m in path) > 0.01
 
 
-def test_filling_a_hollow_body_does_work():
-    """The lumen is filled by a tenth: its pressure's work becomes strain and motion, to 1 % at 20 steps."""
-    lumen = Cavity(
-        lambda x: np.linalg.norm(x, axis=0) < 0.75, volume=lambda t: 1.0 + 0.1 * np.sin(0.5 * np.pi * t) ** 2
-    )
-    problem = Problem(shell_octant(0.5, 3, 2), MATERIAL, symmetry(), cavities=[lumen], density=0.1)
-    last = motion_path(problem, (1.0,), DynamicsSettings(dt=0.05))[-1]
-    assert last.work > 1e-4
-    assert abs(last.balance) < 0.01 * last.work
-
-
 def pulled(settings):
     """A cube drawn out by a half of its height, in a time in which shear waves cross it four times."""
     grip = PrescribedDisplacement(
@@ -229,13 +190,6 @@ def test_a_motion_that_cannot_go_on_says_where_it_was():
     with pytest.raises(SolveError, match=r"no motion found between t = 0\.00.* and t = 0\.5 s") as caught:
         pulled(DynamicsSettings(newton=NewtonSettings(max_iterations=1)))
     assert caught.value.converged == []
-
-
-def test_a_start_on_another_mesh_is_refused():
-    held = [PrescribedDisplacement(lambda x: x[2] < 1e-9)]
-    start = equilibrium_path(Problem(block((1, 1, 1)), MATERIAL, held), (1.0,))[0]
-    with pytest.raises(SolveError, match="start from an equilibrium on this mesh"):
-        motion_path(Problem(block((2, 1, 1)), MATERIAL, held, density=1.0), (1.0,), start=start)
 
 
 def test_each_moment_is_passed_on_when_it_is_solved():

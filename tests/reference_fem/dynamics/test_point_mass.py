@@ -44,10 +44,6 @@ def test_a_heavy_tip_swings_as_a_mass_on_a_spring():
     assert omega == pytest.approx(np.sqrt(stiffness / 100.0), rel=0.02)
 
 
-def test_it_slows_the_swing():
-    assert natural_frequencies(beam(0.1), 1).frequencies[0] < 0.6 * natural_frequencies(beam(1e-9), 1).frequencies[0]
-
-
 @pytest.mark.parametrize(("node", "mass"), [(10**6, 1.0), (0, -1.0), (0, float("nan"))])
 def test_a_mass_that_cannot_hang_is_refused(node, mass):
     problem = Problem(**{**vars(beam(1.0)), "masses": (PointMass(node, mass),)})

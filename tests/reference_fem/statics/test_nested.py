@@ -66,14 +66,6 @@ def test_parts_of_a_straight_mesh_get_quadratic_fields_exactly(straight):
     assert u.shape == nodes(fine).shape and p.shape == (fine.nvertices,)
 
 
-def test_each_node_gets_the_field_of_its_own_element(straight):
-    """A field that no single polynomial is."""
-    coarse, fine = straight
-    u = np.random.default_rng(2).normal(size=nodes(coarse).shape)
-    expected = Evaluator(coarse).displacement(u, nodes(fine))
-    np.testing.assert_allclose(onto(coarse, fine).displacement(u), expected, rtol=0, atol=1e-12)
-
-
 @pytest.fixture(scope="module")
 def round_pair():
     """Two meshes of an eighth of a ball, whose elements are curved."""
@@ -85,13 +77,6 @@ def test_a_curved_mesh_passes_a_linear_displacement_on(round_pair):
     turned = lambda mesh: nodes(mesh) @ np.array([[0.1, 0.2, -0.3], [0.0, 0.4, 0.1], [0.2, 0.0, -0.1]])  # noqa: E731
     field = onto(coarse, fine).displacement(turned(coarse))
     np.testing.assert_allclose(field, turned(fine), rtol=0, atol=1e-12)
-
-
-def test_the_functions_of_a_transfer_are_a_partition_of_one(round_pair):
-    coarse, fine = round_pair
-    to = onto(coarse, fine)
-    for values in (to.linear, to.quadratic):
-        np.testing.assert_allclose(values.sum(axis=1), 1.0, rtol=0, atol=1e-12)
 
 
 def pressed(mesh):
@@ -303,23 +288,6 @@ def test_an_inverted_element_is_made_upright(cube, kind):
         assert not upright[: cube.displacement_count].any(), "it is put between its ends, and nothing else moves"
     away = np.linalg.norm(rest - rest[node], axis=1) > 0.8
     assert not upright[: cube.displacement_count].reshape(-1, 3)[away].any(), "what is far away stays"
-
-
-def test_held_unknowns_stay_where_they_are_held(cube):
-    """A held node is pushed through its element: what is next to it gives way, if it can."""
-    x, rest = np.zeros(cube.total), nodes(cube.problem.mesh)
-    (node,) = np.flatnonzero(np.abs(rest - [1 / 3, 1 / 3, 0.0]).max(axis=1) < 1e-9)
-    x[3 * node : 3 * node + 3] = (0.0, 0.0, 0.35)
-    assert len(inverted(cube, x))
-    upright = repaired(cube, x)
-    np.testing.assert_array_equal(upright[cube.pattern.held], x[cube.pattern.held])
-    assert (upright != x).any()
-
-
-def test_an_upright_state_is_not_touched(start):
-    system, state = start
-    assert not len(inverted(system, state.x))
-    np.testing.assert_array_equal(repaired(system, state.x), state.x)
 
 
 def test_what_sticks_is_not_carried(round_pair):

@@ -125,13 +125,6 @@ def test_predictor_linearises_the_move_of_the_obstacles(system, state):
     np.testing.assert_allclose(lifted, expected, rtol=0.0, atol=AGREES * np.abs(expected).max())
 
 
-def test_rest_is_stress_free(system):
-    problem = Problem(bumpy(), NeoHookean(2.0, 50.0), [PrescribedDisplacement(lambda x: x[2] < 1e-9)])
-    bare = System(problem, NewtonSettings())
-    evaluation = bare.evaluate(np.zeros(bare.total), Loads(0.0, bare.rows, bare.rest().multiplier))
-    assert np.abs(evaluation.residual).max() < 1e-15  # mu is 2 Pa, areas about 0.1 m²: round-off
-
-
 def test_an_inverted_element_stops_the_kernel(system, state):
     x, _, loads = state
     flat = x.copy()

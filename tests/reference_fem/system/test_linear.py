@@ -2,8 +2,6 @@
 
 import builtins
 import importlib.util
-import sys
-import warnings
 
 import numpy as np
 import pytest
@@ -119,16 +117,6 @@ def test_what_single_precision_cannot_solve_is_factorised_in_double(monkeypatch)
 
 
 @pytest.mark.skipif(len(BACKENDS) == 1, reason="pypardiso is not installed")
-def test_both_precisions_give_the_same_equilibrium(monkeypatch):
-    held = [PrescribedDisplacement(lambda x: x[2] < 1e-9)]
-    problem = Problem(block(skew=0.1), NeoHookean(1.0, 1000.0), [*held, *pulled()])
-    states = [equilibrium_path(problem, [1.0], NewtonSettings(solver="pardiso"))[0]]
-    monkeypatch.setattr(linear, "SINGLE_FROM", 10)
-    states.append(equilibrium_path(problem, [1.0], NewtonSettings(solver="pardiso"))[0])
-    np.testing.assert_allclose(states[1].u, states[0].u, atol=1e-9)
-
-
-@pytest.mark.skipif(len(BACKENDS) == 1, reason="pypardiso is not installed")
 def test_both_backends_give_the_same_equilibrium():
     problem = Problem(block(skew=0.1), NeoHookean(1.0, 1000.0), [symmetry()[2], *pulled()])
     states = [equilibrium_path(problem, [1.0], NewtonSettings(solver=backend))[0] for backend in BACKENDS]
@@ -155,20 +143,6 @@ def test_missing_fast_solver_is_mentioned_once(monkeypatch):
             linear.SymmetricSolver("pardiso")
     finally:
         linear.load_pardiso.cache_clear()
-
-
-@pytest.mark.skipif(len(BACKENDS) == 1, reason="pypardiso is not installed")
-def test_the_library_is_searched_once_in_a_process(monkeypatch):
-    """A search for the second solver would end in an error here."""
-    pypardiso = linear.load_pardiso()
-    monkeypatch.setattr(sys.modules[pypardiso.PyPardisoSolver.__module__], "find_library", None)
-    assert isinstance(linear.SymmetricSolver("pardiso").factors, linear.PardisoFactors)
-
-
-def test_the_scipy_backend_never_warns():
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        linear.SymmetricSolver("scipy")
 
 
 @pytest.mark.skipif(len(BACKENDS) == 1, reason="pypardiso is not installed")

@@ -80,7 +80,13 @@ def test_an_inverted_state_is_reported(law):
 
 @pytest.mark.parametrize(
     ("c1", "c2", "kappa", "words"),
-    [(-1.0, 2.0, 10.0, "c1 is -1"), (1.0, np.nan, 10.0, "c2 is nan"), (0.0, 0.0, 10.0, "mu"), (1.0, 0.0, 0.0, "kappa")],
+    [
+        (np.nan, 0.0, 1.0, "c1 is nan"),
+        (-1.0, 2.0, 10.0, "c1 is -1"),
+        (1.0, np.nan, 10.0, "c2 is nan"),
+        (0.0, 0.0, 10.0, "mu"),
+        (1.0, 0.0, 0.0, "kappa"),
+    ],
 )
 def test_constants_out_of_range_are_refused(c1, c2, kappa, words):
     with pytest.raises(SolveError, match=words):

@@ -11,7 +11,6 @@ from reference_fem import (
     RigidCapsule,
     RigidPlane,
     RigidSphere,
-    SolveError,
     equilibrium_path,
 )
 from reference_fem.contact import augmented as contact
@@ -130,12 +129,6 @@ def test_a_plate_without_slip_is_a_bonded_lid():
     assert force[0] > 0.03  # the shear that a frictionless plate cannot give
 
 
-def test_without_friction_the_same_plate_gives_no_shear():
-    path = equilibrium_path(Problem(block((2, 2, 2)), TISSUE, [BOTTOM], [lid("frictionless")]), (1.0, 2.0))
-    assert path[-1].obstacle_force[0, 2] < -0.1
-    assert np.abs(path[-1].obstacle_force[0, :2]).max() < 1e-12
-
-
 def test_what_is_let_go_is_free_again():
     """Down, sideways and away: the body returns to rest, without a traction left behind."""
 
@@ -191,17 +184,3 @@ def test_facets_out_of_reach_change_nothing(monkeypatch):
     )
     assert np.array_equal(touch.pressure, skipped.touch.pressure)
     assert (touch.pressure > 0.0).any()
-
-
-@pytest.mark.parametrize(
-    ("obstacle", "words"),
-    [
-        (RigidCapsule((0.0, 0.0, 2.0), (0.0, 0.0, 2.0), 0.1), "starts and ends at"),
-        (RigidCapsule((0.0, 0.0, 2.0), (0.0, 1.0, 2.0), 0.0), "capsule's radius is 0.0 m"),
-        (RigidCapsule((0.0, 0.0, 1.1), (1.0, 1.0, 1.1), 0.3), "inside the body"),
-        (RigidPlane((0.0, 0.0, 2.0), (0.0, 0.0, -1.0), slip="sticky"), "slip 'sticky'"),
-    ],
-)
-def test_bad_obstacles(obstacle, words):
-    with pytest.raises(SolveError, match=words):
-        equilibrium_path(Problem(block(), TISSUE, [BOTTOM], [obstacle]), (1.0,))
