@@ -26,7 +26,7 @@ from reference_fem.statics.newton import StepFailed, solve_step
 from reference_fem.system import assembly
 from reference_fem.system.saddle_point import System
 from tests.reference_fem.bodies import ball_octant, block, symmetry
-from tests.reference_fem.statics.test_cavity import closed_problem, hollow_cube, in_the_middle
+from tests.reference_fem.model.test_cavity import closed_problem, hollow_cube, in_the_middle
 
 DEEP = 0.2
 """How far the plane goes in, over the radius."""

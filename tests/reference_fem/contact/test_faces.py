@@ -15,7 +15,7 @@ from reference_fem.system.saddle_point import System
 from reference_fem.system.state import Loads
 from studies.meshing.opened_mesh import opened_elements
 from tests.reference_fem.bodies import block
-from tests.reference_fem.system.test_kernels import AGREES, STEP, tangent_misfit
+from tests.reference_fem.system.test_saddle_point import AGREES, STEP, tangent_misfit
 
 TISSUE = NeoHookean(1.0, 1000.0)
 

@@ -11,7 +11,7 @@ from reference_fem.statics.tangent import Tangent
 from reference_fem.system.saddle_point import System
 from reference_fem.system.state import Loads
 from tests.reference_fem.bodies import block
-from tests.reference_fem.statics.test_cavity import hollow_cube, in_the_middle
+from tests.reference_fem.model.test_cavity import hollow_cube, in_the_middle
 
 SINK = 0.03
 """How far the obstacles move at once, a tenth of an edge."""
