@@ -48,7 +48,7 @@ from .scene.library.liver_press import LIVER_PRESS as LIVER_PRESS
 from .scene.library.liver_probe import LIVER_PROBE as LIVER_PROBE
 from .scene.library.spleen_sag import SPLEEN_SAG as SPLEEN_SAG
 from .scene.library.stomach_press import STOMACH_PRESS as STOMACH_PRESS
-from .scene.library.stomach_probe import STOMACH_PROBE as STOMACH_PROBE
+from .scene.library.stomach_press import STOMACH_PROBE as STOMACH_PROBE
 from .scene.library.stomach_slide import STOMACH_SLIDE as STOMACH_SLIDE
 from .scene.scene import ForceOutput as ForceOutput
 from .scene.scene import Held as Held

@@ -7,8 +7,7 @@ from studies.catalog.study import Chart, Study
 from studies.runs.case import Case
 from studies.runs.recipes import VIRTUAL, BodyRecipe, QuadraticBody, SurfaceBody, TetrahedralBody
 from studies.scene.library import CUT
-from studies.scene.library.ball_bisected import BALL_BISECTED
-from studies.scene.library.ball_incised import BALL_INCISED
+from studies.scene.library.ball_cuts import BALL_BISECTED, BALL_INCISED
 from studies.scene.scene import Scene
 
 BODIES = (

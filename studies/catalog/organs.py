@@ -4,7 +4,8 @@ from massspring import Free, ImplicitVolume
 from studies.catalog.study import Chart, Study
 from studies.runs.case import Case
 from studies.runs.recipes import BodyRecipe, SurfaceBody, TetrahedralBody
-from studies.scene.library import BLADDER_FILL, KIDNEY_PROBE, SPLEEN_SAG, STOMACH_PRESS, STOMACH_PROBE, Scene
+from studies.scene.library import BLADDER_FILL, KIDNEY_PROBE, SPLEEN_SAG, STOMACH_PRESS, STOMACH_PROBE
+from studies.scene.scene import Scene
 from studies.store.schema import Status
 
 SOLID, HOLLOW = (KIDNEY_PROBE, SPLEEN_SAG), (STOMACH_PRESS, STOMACH_PROBE, BLADDER_FILL)

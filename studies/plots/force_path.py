@@ -32,7 +32,7 @@ from studies.plots.style.page import (
 )
 from studies.plots.style.style import BLACK, GREY, SMALL, drawing, styled
 from studies.runs.recipes import BodyRecipe
-from studies.scene.library import Scene
+from studies.scene.scene import Scene
 
 TITLE = "Force against the reference"
 CUT_TITLE = "Force on the end that is moved, of a body that is cut, against the reference"

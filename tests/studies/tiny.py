@@ -11,8 +11,8 @@ from studies.catalog import Study
 from studies.geometry.mesh.organ_mesh import boundary_triangles
 from studies.runs.case import Case
 from studies.runs.recipes import TetrahedralBody
-from studies.scene.library import Organ, Scene
 from studies.scene.library.ball_squeeze import BALL_SQUEEZE
+from studies.scene.scene import Organ, Scene
 from studies.store.ledger import Ledger
 from studies.sweep.job import CaseJob
 

@@ -1,28 +1,20 @@
-"""The scenes, one file each. Adding one: a file and a line in SCENES, from which all else follows."""
+"""The scenes. Adding one: a file and a line in SCENES, from which all else follows."""
 
-from studies.scene.library.ball_bisected import BALL_BISECTED
 from studies.scene.library.ball_clamped import BALL_CLAMPED
-from studies.scene.library.ball_cut_pressed import BALL_CUT_PRESSED
-from studies.scene.library.ball_cut_twice import BALL_CUT_TWICE
-from studies.scene.library.ball_incised import BALL_INCISED
+from studies.scene.library.ball_cuts import BALL_BISECTED, BALL_CUT_PRESSED, BALL_CUT_TWICE, BALL_INCISED, SHELL_OPENED
 from studies.scene.library.ball_ringing import BALL_RINGING
 from studies.scene.library.ball_squeeze import BALL_SQUEEZE
 from studies.scene.library.bladder_fill import BLADDER_FILL
 from studies.scene.library.kidney_bisected import KIDNEY_BISECTED
 from studies.scene.library.kidney_probe import KIDNEY_PROBE
-from studies.scene.library.liver_cut_live import LIVER_CUT_LIVE
-from studies.scene.library.liver_incised import LIVER_INCISED
+from studies.scene.library.liver_incised import LIVER_CUT_LIVE, LIVER_INCISED
 from studies.scene.library.liver_press import LIVER_PRESS
 from studies.scene.library.liver_probe import LIVER_PROBE
-from studies.scene.library.shell_opened import SHELL_OPENED
 from studies.scene.library.spleen_sag import SPLEEN_SAG
 from studies.scene.library.stomach_opened import STOMACH_OPENED
-from studies.scene.library.stomach_press import STOMACH_PRESS
-from studies.scene.library.stomach_probe import STOMACH_PROBE
+from studies.scene.library.stomach_press import STOMACH_PRESS, STOMACH_PROBE
 from studies.scene.library.stomach_slide import STOMACH_SLIDE
-from studies.scene.scene import ForceOutput, Held, Lumen, Organ, ReferencePlan, Scene
-from studies.scene.start import InitialConditions
-from studies.scene.tissues import Tissue
+from studies.scene.scene import Scene
 
 SCENES: tuple[Scene, ...] = (
     BALL_SQUEEZE,
@@ -54,37 +46,3 @@ CUT: tuple[Scene, ...] = (
 )
 """Scenes that cut their organ. They are not in SCENES, since surface bodies cannot run scenes with a front inside the
 organ, and half of the methods support no cuts."""
-
-__all__ = [
-    "BALL_BISECTED",
-    "BALL_CLAMPED",
-    "BALL_CUT_PRESSED",
-    "BALL_CUT_TWICE",
-    "BALL_INCISED",
-    "BALL_RINGING",
-    "BALL_SQUEEZE",
-    "BLADDER_FILL",
-    "CUT",
-    "JUDGED",
-    "KIDNEY_BISECTED",
-    "KIDNEY_PROBE",
-    "LIVER_CUT_LIVE",
-    "LIVER_INCISED",
-    "LIVER_PRESS",
-    "LIVER_PROBE",
-    "SCENES",
-    "SHELL_OPENED",
-    "SPLEEN_SAG",
-    "STOMACH_OPENED",
-    "STOMACH_PRESS",
-    "STOMACH_PROBE",
-    "STOMACH_SLIDE",
-    "ForceOutput",
-    "Held",
-    "InitialConditions",
-    "Lumen",
-    "Organ",
-    "ReferencePlan",
-    "Scene",
-    "Tissue",
-]

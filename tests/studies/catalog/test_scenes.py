@@ -15,8 +15,9 @@ from studies.runs.recipes import BODIES
 from studies.runs.run import checkpoint_frames
 from studies.scene.as_json import scene_from_dict, scene_to_json
 from studies.scene.kind import has_wall
-from studies.scene.library import JUDGED, SCENES, InitialConditions
+from studies.scene.library import JUDGED, SCENES
 from studies.scene.library.stress import STRESS_SCENES
+from studies.scene.start import InitialConditions
 from tests.studies.tiny import bodies_of
 
 SMALL, THIN = 150, 400

@@ -9,7 +9,7 @@ import pytest
 from studies.base.errors import StudyError
 from studies.metrics.timing import cases as timed
 from studies.runs.current import case_path
-from studies.scene.library import ReferencePlan
+from studies.scene.scene import ReferencePlan
 from studies.store.entry import OTHER_VERSION
 from studies.store.ledger import Ledger
 from studies.store.record import Status, read_record, write_record

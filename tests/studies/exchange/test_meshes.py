@@ -26,9 +26,8 @@ from studies.runs.case import Case
 from studies.runs.recipes import TetrahedralBody
 from studies.runs.run import measure
 from studies.scene.library import BALL_BISECTED, BALL_INCISED, BALL_SQUEEZE
-from studies.scene.library.ball_incised import RADIUS
-from studies.scene.library.liver_cut_live import LIVER_CUT_LIVE
-from studies.scene.library.shell_opened import SHELL_OPENED
+from studies.scene.library.ball_cuts import RADIUS, SHELL_OPENED
+from studies.scene.library.liver_incised import LIVER_CUT_LIVE
 
 pytestmark = pytest.mark.slow
 NODES = 150

@@ -20,7 +20,7 @@ from studies.meshing.true_shape import true_shape
 from studies.scene.library.ball_clamped import BALL_CLAMPED, CAP, RADIUS
 from studies.scene.library.liver_probe import LIVER_PROBE
 from studies.scene.library.spleen_sag import SPLEEN_SAG
-from studies.scene.library.stomach_probe import STOMACH_PROBE
+from studies.scene.library.stomach_press import STOMACH_PROBE
 from studies.scene.scene import Held
 from tests.studies.tiny import cube, file_scene, write_obj
 

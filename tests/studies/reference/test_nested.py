@@ -15,9 +15,9 @@ from studies.reference.load import load_reference
 from studies.reference.nested import GROWTH, solve_nested, targets
 from studies.reference.reference_solves import ReferenceSolve
 from studies.reference.solve import VARIANTS, solve
-from studies.scene.library import BALL_CLAMPED, ReferencePlan
+from studies.scene.library import BALL_CLAMPED
 from studies.scene.library.ball_clamped import RADIUS
-from studies.scene.scene import ForceOutput
+from studies.scene.scene import ForceOutput, ReferencePlan
 from studies.store.record import Status, read_record
 from tests.campaigns import campaign
 

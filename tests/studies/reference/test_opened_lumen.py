@@ -17,10 +17,9 @@ from studies.reference.nested import path_of, problems_of
 from studies.reference.problem import problem_on
 from studies.reference.reference_solves import ReferenceSolve
 from studies.reference.solve import solve
-from studies.scene.library import SHELL_OPENED, ReferencePlan
-from studies.scene.library.ball_incised import RADIUS
-from studies.scene.library.shell_opened import WALL
-from studies.scene.scene import Held, Lumen
+from studies.scene.library import SHELL_OPENED
+from studies.scene.library.ball_cuts import RADIUS, WALL
+from studies.scene.scene import Held, Lumen, ReferencePlan
 
 PLAN = ReferencePlan(base=100, at_contact=0, most=6e3, variants=("kappa",))
 FULL = Lumen(filling=Ramp((0.0, 0.7), (1.0, 1.15)))

@@ -13,7 +13,7 @@ from studies.reference.reference_solves import ReferenceSolve
 from studies.reference.solve import solve
 from studies.reference.uncertainty import QUANTITIES
 from studies.report.references import uncertainty_table
-from studies.scene.library import ReferencePlan
+from studies.scene.scene import ReferencePlan
 from tests.studies.octant import SCENE
 
 RADIUS, SHEAR = 0.05, SCENE.tissue.shear_modulus

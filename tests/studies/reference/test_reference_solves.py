@@ -14,8 +14,9 @@ from studies.reference.load import load_reference
 from studies.reference.reference_solves import ReferenceSolve, reference_solves, settings_varied
 from studies.reference.solve import solve
 from studies.scene.as_json import scene_from_dict, scene_to_json
-from studies.scene.library import SCENES, ReferencePlan
+from studies.scene.library import SCENES
 from studies.scene.library.ball_clamped import BALL_CLAMPED
+from studies.scene.scene import ReferencePlan
 from studies.store.ledger import Ledger
 from studies.store.record import Status, read_record
 from studies.sweep import job as jobs_module

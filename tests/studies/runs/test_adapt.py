@@ -11,9 +11,9 @@ from studies.geometry import HalfSpace
 from studies.meshing.scene_mesh import mesh_for, patch_nodes
 from studies.runs.prepare import attachments_for, body_for, prepare
 from studies.runs.recipes import BODIES, MembraneBody, TetrahedralBody
-from studies.scene.library import Held
 from studies.scene.library.ball_clamped import BALL_CLAMPED
 from studies.scene.library.bladder_fill import BLADDER_FILL
+from studies.scene.scene import Held
 from tests.studies.geometry.boxes import box, split
 from tests.studies.tiny import NODES, SQUEEZE, cube, file_scene, tiny_case, write_obj
 

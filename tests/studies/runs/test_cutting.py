@@ -21,8 +21,7 @@ from studies.runs.case import Case
 from studies.runs.prepare import prepare
 from studies.runs.recipes import QuadraticBody, SurfaceBody, TetrahedralBody
 from studies.runs.run import measure
-from studies.scene.library.ball_bisected import BALL_BISECTED
-from studies.scene.library.ball_incised import BALL_INCISED
+from studies.scene.library.ball_cuts import BALL_BISECTED, BALL_INCISED
 from studies.scene.library.kidney_bisected import KIDNEY_BISECTED
 from studies.store.record import write_record
 from tests.campaigns import campaign

@@ -21,10 +21,10 @@ from studies.runs.case import Case
 from studies.runs.prepare import prepare
 from studies.runs.recipes import TetrahedralBody
 from studies.runs.run import measure
-from studies.scene.library import Lumen, ReferencePlan
 from studies.scene.library.ball_ringing import BALL_RINGING, RADIUS
 from studies.scene.library.ball_squeeze import BALL_SQUEEZE
 from studies.scene.quantities import allowed
+from studies.scene.scene import Lumen, ReferencePlan
 from studies.scene.start import InitialConditions
 from studies.store.record import Status
 

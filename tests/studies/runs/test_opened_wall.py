@@ -16,8 +16,7 @@ from studies.runs.prepare import mesh_of, prepare, prepared_on
 from studies.runs.recipes import MembraneBody, QuadraticBody, SurfaceBody, TetrahedralBody
 from studies.scene.checks import check_scene
 from studies.scene.library import BALL_CLAMPED, SHELL_OPENED
-from studies.scene.library.ball_incised import RADIUS
-from studies.scene.library.shell_opened import WALL
+from studies.scene.library.ball_cuts import RADIUS, WALL
 from studies.scene.scene import Lumen
 from tests.campaigns import campaigns_but
 

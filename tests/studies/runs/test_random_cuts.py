@@ -11,7 +11,8 @@ from studies.geometry import BallRegion, HalfSpace
 from studies.meshing.graded_mesh import MIDDLE, halved
 from studies.meshing.scene_mesh import mesh_for
 from studies.meshing.shaping import quadratic_mesh
-from studies.runs.case import BodyRecipe, Case
+from studies.runs.case import Case
+from studies.runs.recipes import QuadraticBody, TetrahedralBody
 from studies.runs.cutting import LUMEN
 from studies.runs.prepare import prepared_on
 from studies.scene.checks import check_scene, surface_of
@@ -98,7 +99,8 @@ def tissue(body):
 def test_a_cut_parts_the_body_and_changes_nothing_else(scene, body):
     quadratic = body == "quadratic" and scene.lumen is None
     law = "van_gelder" if body == "quadratic" else body
-    recipe = BodyRecipe("quadratic", 4 * NODES - 6) if quadratic else BodyRecipe(nodes=NODES, law=law, volumes="nodal")
+    nodal = TetrahedralBody(NODES, law=law, volumes="nodal")
+    recipe = QuadraticBody(4 * NODES - 6) if quadratic else nodal
     try:
         check_scene(scene)
         if quadratic:

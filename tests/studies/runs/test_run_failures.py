@@ -11,7 +11,7 @@ from studies.geometry import HalfSpace
 from studies.meshing.scene_mesh import mesh_for
 from studies.runs.recipes import BODIES, SurfaceBody, TetrahedralBody
 from studies.runs.run import measure, run_case
-from studies.scene.library import Held, Organ
+from studies.scene.scene import Held, Organ
 from studies.store.record import Status, read_record
 from tests.studies.tiny import NODES, SQUEEZE, cube, file_scene, tiny_case, why_stale, write_obj
 

@@ -29,9 +29,7 @@ from studies.runs.recipes import QuadraticBody, SurfaceBody, TetrahedralBody
 from studies.runs.run import measure
 from studies.scene.checks import check_scene
 from studies.scene.cut import Cut, nearest_cut
-from studies.scene.library.ball_bisected import BALL_BISECTED
-from studies.scene.library.ball_cut_twice import AWAY, BALL_CUT_TWICE, SECOND_AT
-from studies.scene.library.ball_incised import CUT_AT, HALF, MIDDLE, RADIUS
+from studies.scene.library.ball_cuts import AWAY, BALL_BISECTED, BALL_CUT_TWICE, CUT_AT, HALF, MIDDLE, RADIUS, SECOND_AT
 from tests.campaigns import campaign
 
 pytestmark = pytest.mark.slow

@@ -21,8 +21,7 @@ from studies.runs.prepare import prepare
 from studies.runs.recipes import QuadraticBody, TetrahedralBody
 from studies.runs.run import measure
 from studies.scene.as_json import scene_from_dict, scene_to_dict
-from studies.scene.library.ball_cut_pressed import BALL_CUT_PRESSED, PUSH, RADIUS
-from studies.scene.library.ball_incised import BALL_INCISED
+from studies.scene.library.ball_cuts import BALL_CUT_PRESSED, BALL_INCISED, PUSH, RADIUS
 from tests.campaigns import campaigns_but
 
 pytestmark = pytest.mark.slow

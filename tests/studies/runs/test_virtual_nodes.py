@@ -14,9 +14,7 @@ from studies.runs.case import Case, case_from_json
 from studies.runs.prepare import prepare
 from studies.runs.recipes import TetrahedralBody
 from studies.runs.run import measure
-from studies.scene.library.ball_bisected import BALL_BISECTED
-from studies.scene.library.ball_cut_pressed import BALL_CUT_PRESSED
-from studies.scene.library.ball_incised import BALL_INCISED
+from studies.scene.library.ball_cuts import BALL_BISECTED, BALL_CUT_PRESSED, BALL_INCISED
 from studies.store.record import write_record
 
 pytestmark = pytest.mark.slow

@@ -13,7 +13,8 @@ from studies.reference.published import published
 from studies.runs.case import Case, case_from_json
 from studies.scene.as_json import scene_from_dict, scene_to_json
 from studies.scene.cut import Cut
-from studies.scene.library import BALL_CLAMPED, JUDGED, Organ
+from studies.scene.library import BALL_CLAMPED, JUDGED
+from studies.scene.scene import Organ
 
 MIDDLE = HalfSpace((0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
 CUT = Cut("slit", MIDDLE, BallRegion((0.0, 0.0, 0.0), 0.01), at=1.0)

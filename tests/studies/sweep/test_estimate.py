@@ -14,7 +14,8 @@ from studies.runs.case import Case
 from studies.runs.current import case_path
 from studies.runs.recipes import recipe_from_dict
 from studies.runs.user_code import methods_by_name
-from studies.scene.library import JUDGED, SCENES, Organ
+from studies.scene.library import JUDGED, SCENES
+from studies.scene.scene import Organ
 from studies.store.ledger import Ledger
 from studies.store.machine import machine_id
 from studies.store.record import read_record, write_record

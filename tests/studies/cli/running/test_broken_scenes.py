@@ -20,7 +20,7 @@ from massspring import Capsule, Plane, Probe, Sphere, Trajectory
 from studies.catalog import Chart
 from studies.geometry import BallRegion, HalfSpace
 from studies.scene.cut import Cut
-from studies.scene.library import ForceOutput, Held, Organ, ReferencePlan
+from studies.scene.scene import ForceOutput, Held, Organ, ReferencePlan
 from studies.scene.scene import Lumen
 from tests.studies.tiny import SQUEEZE, tiny_case, tiny_study
 

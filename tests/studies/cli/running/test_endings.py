@@ -11,7 +11,7 @@ from studies.base.errors import StudyError
 from studies.catalog import STUDIES, Study
 from studies.reference.reference_solves import ReferenceSolve
 from studies.runs.current import case_path
-from studies.scene.library import ReferencePlan
+from studies.scene.scene import ReferencePlan
 from studies.store.record import Status, read_record, write_record
 from studies.sweep.job import CaseJob, ReferenceJob, jobs_of
 from studies.sweep.standings import CAUSES, Standing, causes, summary, unexpected
@@ -23,7 +23,7 @@ FILE = """from tests.studies.tiny import tiny_study
 STUDY = tiny_study({})
 """
 WITH_REFERENCE = """from dataclasses import replace
-from studies.scene.library import ReferencePlan
+from studies.scene.scene import ReferencePlan
 from tests.studies.tiny import SQUEEZE, tiny_case, tiny_study
 
 SCENE = replace(SQUEEZE, checkpoints=(1.0, 4.0), reference=ReferencePlan("octant", (0.9, 0.5), variants=()))
