@@ -12,9 +12,9 @@ from studies.meshing.graded_mesh import MIDDLE, halved
 from studies.meshing.scene_mesh import mesh_for
 from studies.meshing.shaping import quadratic_mesh
 from studies.runs.case import Case
-from studies.runs.recipes import QuadraticBody, TetrahedralBody
 from studies.runs.cutting import LUMEN
 from studies.runs.prepare import prepared_on
+from studies.runs.recipes import QuadraticBody, TetrahedralBody
 from studies.scene.checks import check_scene, surface_of
 from studies.scene.cut import Cut
 from studies.scene.scene import ForceOutput, Held, Lumen, Organ, Scene
