@@ -9,20 +9,15 @@ from massspring import quadratic_body, surface_body, tetrahedral_body
 from studies.geometry import organ
 from studies.geometry.organs import make_shape
 from studies.geometry.surface.first_surface import true_volume
-from studies.meshing.bounds import SHAPE, SHAPE_VOLUME
 from studies.meshing.rest_surface import LUMEN, OUTER, rest_surfaces
 from studies.meshing.true_surface import shape_errors, true_surface
-from studies.metrics.table import metric, study_table
+from studies.metrics.table import metric
 from studies.runs.recipes import TetrahedralBody
-from studies.scene.library import LIVER_PRESS
 from studies.scene.scene import Organ
-from studies.tools.advise.answer import advise
-from studies.tools.advise.words import lines_of
 from tests.massspring.conftest import SOFT, icosphere
 from tests.massspring.quadratic import RADIUS, ball_mesh
-from tests.studies.metrics.bodies import LIVER, ball_run, liver_runs
+from tests.studies.metrics.bodies import ball_run
 from tests.studies.tiny import cube, file_scene, write_obj
-from tests.studies.tools.advise.made_up_campaign import GRADED, LADDER, publish, row
 
 DIAGONAL = 2.0 * RADIUS * 3.0**0.5
 SHAPES = ("shape_error", "shape_volume")
@@ -61,13 +56,6 @@ def test_a_bump_and_a_flattened_cap_are_both_seen(ball):
     assert shape_of(ball_run(ball, bump))[0] == pytest.approx(100 * 0.2 * RADIUS / DIAGONAL, rel=0.05)
     cut[:, 0] = np.minimum(x[:, 0], 0.8 * RADIUS)
     assert shape_of(ball_run(ball, cut))[0] == pytest.approx(100 * 0.2 * RADIUS / DIAGONAL, rel=0.05)
-
-
-def test_facets_with_six_nodes_count_as_curved(ball):
-    """The flat triangles between the same nodes cut four times as far through the ball, and lose more volume."""
-    flat = tetrahedral_body(ball.rest, ball.triangles, ball.tetrahedra, SOFT)
-    curved, straight = shape_of(ball_run(ball)), shape_of(ball_run(flat, kind="tetrahedral"))
-    assert straight[0] > 4 * curved[0] and straight[1] < 10 * curved[1] < 0
 
 
 def test_a_flat_sphere_loses_what_its_triangles_cut_off():
@@ -131,22 +119,3 @@ def test_without_its_file_a_body_has_no_shape_error(tmp_path):
 def test_a_record_whose_facets_are_in_another_order_has_no_shape(ball):
     run = ball_run(replace(ball, triangles=ball.triangles[::-1]))
     assert np.isnan(shape_of(run)).all()
-
-
-def test_a_liver_that_is_five_per_cent_shorter_is_caught_by_metric_table_and_advice(tmp_path, mesh_cache):
-    """By whatever the mesher loses, a twentieth of the length is worse: 2.5 % of it at each end."""
-    whole, short = liver_runs((1.0, 1.0, 1.0), (0.95, 1.0, 1.0))
-    distance, volume = shape_of(short)
-    assert distance > max(SHAPE, shape_of(whole)[0] + 1.0) and volume < shape_of(whole)[1] - 4.5 < -SHAPE_VOLUME
-    table = study_table([whole, short], SHAPES)
-    assert list(table["shape_error [%]"]) == pytest.approx([shape_of(whole)[0], distance])
-    assert list(table["shape_volume [%]"]) == pytest.approx([shape_of(whole)[1], volume])
-    kept = [row(LIVER_PRESS, body, numbers) for body, numbers in LADDER.items() if body != GRADED]
-    shown = {"shape_error [%]": distance, "shape_volume [%]": volume}
-    advice = advise(
-        LIVER_PRESS, results=publish(tmp_path, [*kept, row(LIVER_PRESS, LIVER, LADDER[GRADED]) | shown]), timing=False
-    )
-    assert advice.meets and advice.chosen is not None and advice.chosen.case.body.nodes == 1194
-    assert advice.misshapen is not None and advice.misshapen.case.body == LIVER
-    (line,) = [line for line in lines_of(advice) if line.startswith("not recommended: ")]
-    assert f"{distance:.3g} % of the liver's size" in line and f"lacks {-volume:.3g} % of its volume" in line

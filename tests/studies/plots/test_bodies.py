@@ -7,15 +7,13 @@ import pytest
 from matplotlib.colors import to_hex
 from matplotlib.lines import Line2D
 
-from massspring import METHODS, Free, ImplicitVolume
-from studies.plots import force_path, laws, methods, volume_history
-from studies.plots.campaigns import recovery, stability
+from massspring import Free, ImplicitVolume
+from studies.plots import force_path, volume_history
+from studies.plots.campaigns import recovery
 from studies.plots.style.bodies import body_looks
 from studies.plots.style.style import BLACK, BODY_LOOKS, SPARE_LOOKS, VERMILLION, method_colour, styled
 from studies.runs.recipes import VIRTUAL
-from studies.scene.library.stomach_press import STOMACH_PRESS
 from tests.studies.plots.made_up import run
-from tests.studies.plots.reading import words
 
 RECIPES = [
     *(
@@ -43,14 +41,6 @@ def test_every_kind_with_every_choice_of_volumes_looks_different():
     assert len(RECIPES) == len(BODY_LOOKS) + len(SPARE_LOOKS)
 
 
-def test_a_known_body_looks_the_same_in_every_chart():
-    alone = body_looks([run(kind="surface")])
-    all_looks = body_looks([run(**chosen) for chosen in reversed(RECIPES)])
-    for body, look in alone.items():
-        assert all_looks[body].name == look.name
-        assert (all_looks[body].line, all_looks[body].marker) == (look.line, look.marker) == BODY_LOOKS["surface"]
-
-
 def test_bodies_of_one_method_have_the_colours_of_their_families():
     mixed = body_looks([run(kind="surface"), run(), run(nodes=350), run(method=Free())])
     assert {look.colour("implicit_volume") for look in mixed.values()} == {method_colour("implicit_volume")}
@@ -61,13 +51,6 @@ def test_bodies_of_one_method_have_the_colours_of_their_families():
     assert whole.colour("implicit_volume") == VERMILLION != virtual.colour("implicit_volume")
     (alone,) = body_looks([run()]).values()
     assert alone.colour("implicit_volume") == method_colour("implicit_volume")
-
-
-def test_dash_patterns_fit_into_a_legend_entry():
-    """A pattern repeats within the handle: 2.4 times 10 pt long, with lines 1.9 pt wide."""
-    patterns = [line for line, _ in (*BODY_LOOKS.values(), *SPARE_LOOKS) if line != "-"]
-    assert all(1.9 * sum(dashes) <= 24 for _, dashes in patterns)
-    assert len(set(patterns)) == len(patterns)
 
 
 @pytest.mark.parametrize(
@@ -83,11 +66,6 @@ def test_names_of_bodies_of_one_series_say_what_differs(options, names):
     runs = [run(kind=kind, recipe=chosen) for chosen in options]
     assert named(runs) == names
     assert len({look.line for look in body_looks(runs).values()}) == 2
-
-
-def test_what_differs_between_scenes_alone_needs_no_words():
-    runs = [run(kind="surface"), run(STOMACH_PRESS, kind="surface", recipe={"axis": "centre_line"})]
-    assert named(runs) == ["surface", "surface"]
 
 
 def test_an_option_shown_in_another_way_is_left_out():
@@ -121,24 +99,3 @@ def pattern(line: Line2D):
     """Dashes in multiples of the width, and colour, of a line."""
     dashes = line._unscaled_dash_pattern[1]  # pyright: ignore[reportAttributeAccessIssue]
     return (tuple(np.round(dashes, 6)) if dashes else "-", to_hex(line.get_color()))
-
-
-def test_regions_of_different_number_have_lines_of_their_own_among_the_laws():
-    runs = [run(recipe={"volumes": "regions", "regions": number}) for number in (8, 32)]
-    legend = words(laws.figure(runs).legends[0])
-    assert "tetrahedral, 8 volumes" in legend and "tetrahedral, 32 volumes" in legend
-
-
-def test_rows_and_panels_carry_the_body():
-    runs = [run(recipe={"volumes": "regions"}), run(kind="surface")]
-    assert list(methods.row_names(runs).values()) == [
-        "implicit volume, tetrahedral, 32 volumes",
-        "implicit volume, surface",
-    ]
-    assert list(methods.row_names(runs[:1]).values()) == ["implicit volume, 32 volumes"]
-    titles = [axes.get_title().replace("\n", " ") for axes in stability.figure(runs).axes]
-    assert "Ball squeeze, surface, implicit volume" in titles
-
-
-def test_a_method_of_the_user_has_a_colour_that_no_other_method_has():
-    assert method_colour("a_method_of_mine") not in {method_colour(method.name) for method in METHODS}

@@ -1,7 +1,5 @@
 """What the charts of accuracy say: numbers where they belong, never below the floor, doubtful ones marked."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -40,13 +38,6 @@ def test_a_diverged_run_ends_where_it_broke_and_does_not_scale_the_axis():
     assert "diverged; shown up to there" in words(figure)
 
 
-def test_a_note_names_a_missing_reference():
-    note = "No error is shown for ball squeeze"
-    assert note in words(volume_history.figure([run(with_reference=False)]))
-    assert note in words(accuracy.figure([run(with_reference=False)]))
-    assert note not in words(volume_history.figure([run()]))
-
-
 def test_the_smaller_step_is_thin_and_in_the_lower_panel_alone():
     runs = [run(volume_end=-0.02), run(volume_end=-0.01, fraction=0.05)]
     upper, lower = volume_history.figure(runs).axes
@@ -56,30 +47,9 @@ def test_the_smaller_step_is_thin_and_in_the_lower_panel_alone():
     assert "smaller time step" in words(volume_history.figure(runs).legends[0])
 
 
-def test_where_no_volume_changes_only_its_size_is_drawn():
-    figure = volume_history.figure([run(volume_end=1e-8)])
-    (size,) = figure.axes
-    assert size.get_yscale() == "log" and len(lines(size, BLUE)) == 1
-    assert "only its size is drawn" in words(figure)
-    assert len(volume_history.figure([run(volume_end=0.006)]).axes) == 2
-
-
-def test_many_scenes_stand_in_rows_of_four():
-    runs = [run(scene=replace(BALL_SQUEEZE, name=f"ball_{k}"), volume_end=-0.02) for k in range(5)]
-    drawn = [axes for axes in volume_history.figure(runs).axes if axes.axison]
-    assert len(drawn) == 10 and len({round(axes.get_position().x0, 3) for axes in drawn}) == 4
-    assert [axes.get_title() for axes in drawn if axes.get_title()] == [f"Ball {k}" for k in range(5)]
-
-
 @pytest.mark.parametrize(("error", "label"), [(0.25, "−25 %"), (-0.1, "+10 %"), (0.0042, "−0.4 %"), (0.0004, "0.0 %")])
 def test_force_error_stands_at_the_end_of_its_line(error, label):
     assert label in words(force_path.figure([run(error=error)]))
-
-
-@pytest.mark.parametrize(("error", "ends"), [(0.2, (0.0, 4.24)), (3.0, (-8.48, 0.0))])
-def test_the_axis_of_the_force_reaches_to_the_largest_of_either_sign(error, ends):
-    (axes,) = force_path.figure([run(error=error)]).axes
-    assert axes.get_ylim() == pytest.approx(ends)
 
 
 def test_force_of_the_reference_holds_when_the_press_stops():
@@ -178,12 +148,6 @@ def test_shares_of_an_error_bar_are_drawn_where_they_are():
     assert "Observed order 2." in words(figure)
 
 
-def test_the_lowest_panel_of_each_column_has_its_axis():
-    figure = uncertainty.figure({f"scene_{k}": {"force": error_bar()} for k in range(3)})
-    labelled = [bool(axes.get_xlabel()) and axes.xaxis.get_ticklabels()[0].get_visible() for axes in figure.axes[:3]]
-    assert labelled == [False, True, True]
-
-
 def test_error_bars_stand_in_the_row_of_their_name():
     """A scene that allows fewer quantities leaves rows empty; it does not move up into another's."""
     names = ("force", "surface", "silhouette")
@@ -193,10 +157,3 @@ def test_error_bars_stand_in_the_row_of_their_name():
     assert [label.get_text() for label in few.get_yticklabels()] == list(names)
     assert [names[int(y)] for _, y, _ in points(few, BLUE)] == ["force", "silhouette"]
     assert [names[int(y)] for _, y, _ in points(all_of_them, BLUE)] == list(names)
-
-
-def test_error_bars_without_references_say_so(tmp_path):
-    assert "no reference" in words(uncertainty.figure({}))
-    uncertainty.draw({"ball_squeeze": {"force": error_bar()}}, tmp_path / "a.png")
-    uncertainty.draw({"ball_squeeze": {"force": error_bar()}}, tmp_path / "b.png")
-    assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()

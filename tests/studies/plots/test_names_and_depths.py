@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 
 from massspring import Free
-from studies.base.counting import counted
 from studies.plots.force_path import figure
 from studies.plots.style.style import method_label
 from studies.runs.case import Case
-from studies.scene.library import BALL_CLAMPED, LIVER_PRESS, LIVER_PROBE
+from studies.scene.library import LIVER_PRESS, LIVER_PROBE
 from studies.scene.library.ball_squeeze import BALL_SQUEEZE
 from tests.studies.plots.made_up import run
 
@@ -37,12 +36,6 @@ def test_the_first_touch_of_an_octant_may_lie_in_another_eighth():
     assert ", 2 × 15 mm in" in title(BALL_SQUEEZE, np.array([[0.0, 0.0, 0.05], [0.05, 0.0, 0.0]]))
 
 
-def test_without_a_reference_no_depth_is_given_and_a_held_region_has_its_whole_way():
-    assert title(LIVER_PRESS, None) == "Liver press, in 6 s"
-    way = 1e3 * float(np.linalg.norm(BALL_CLAMPED.held[BALL_CLAMPED.probed.number].path.displacements[-1]))
-    assert f", {way:g} mm in" in title(BALL_CLAMPED, np.zeros((1, 3)))
-
-
 def test_own_methods_keep_their_names_in_legends():
     assert method_label("implicit_volume") == "implicit volume" and method_label("lbfgs_nh") == "lbfgs_nh"
     made = run(LIVER_PRESS)
@@ -51,8 +44,3 @@ def test_own_methods_keep_their_names_in_legends():
     object.__setattr__(case, "method", own)
     sheet = figure([type(made)(case, made.record, made.reference)])
     assert any("lbfgs_nh" in text.get_text() for legend in sheet.legends for text in legend.get_texts())
-
-
-def test_one_thing_has_no_plural():
-    assert counted(1, "case") == "1 case" and counted(0, "case") == "0 cases"
-    assert counted(1200, "study", "studies") == "1,200 studies"

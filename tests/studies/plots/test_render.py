@@ -1,21 +1,18 @@
 """The camera, the lamp, what hides what; styles, labels and organs."""
 
-from io import BytesIO
-
 import matplotlib
 import numpy as np
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
-from matplotlib.image import imread
 from matplotlib.patches import Patch
 
 from massspring import METHODS
 from studies.plots import volume_history
 from studies.plots.style.page import finish, page, spread_out
 from studies.plots.style.render import LIGHT, Camera, draw_surface, shade, uniform, vertex_normals
-from studies.plots.style.style import method_colour, save, styled
+from studies.plots.style.style import method_colour, styled
 from tests.studies.plots.made_up import POINTS, RADIUS, TRIANGLES, run
 
 FRONT = Camera(azimuth=-90.0, elevation=0.0)
@@ -86,14 +83,6 @@ def test_a_legend_stays_on_the_page_and_over_its_notes(letters):
     assert note.y0 >= 0
 
 
-def test_many_notes_are_cut_short():
-    figure = finish(page(8.0, 3.0), "Title", [], [f"note {k}" for k in range(50)])
-    note = figure.texts[-1].get_text()
-    assert "note 7" in note
-    assert "42 more" in note
-    assert figure.get_figheight() < 5
-
-
 def test_every_method_has_its_own_colour():
     assert len({method_colour(method.name) for method in METHODS}) == len(METHODS)
 
@@ -103,8 +92,3 @@ def test_the_users_own_settings_change_nothing(tmp_path):
     with matplotlib.rc_context({"font.size": 30, "axes.facecolor": "red", "savefig.dpi": 20, "lines.marker": "x"}):
         volume_history.draw([run()], tmp_path / "b.png")
     assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
-
-
-def test_saved_size_is_inches_times_dpi(tmp_path):
-    save(Figure(figsize=(2, 1)), tmp_path / "a.png", dpi=100)
-    assert imread(BytesIO((tmp_path / "a.png").read_bytes())).shape[:2] == (100, 200)

@@ -11,9 +11,7 @@ from studies.metrics.metrics import METRICS
 from studies.plots import work_precision as work
 from studies.plots.style.families import CONTESTANTS, FAMILIES, PAPER, VIRTUAL_NODES, family_of
 from studies.plots.style.style import BLACK, BLUE, GREY, VERMILLION
-from studies.scene.library import JUDGED
 from studies.scene.library.ball_clamped import BALL_CLAMPED
-from studies.scene.library.ball_squeeze import BALL_SQUEEZE
 from studies.scene.library.liver_press import LIVER_PRESS
 from studies.store.record import Status
 from tests.studies.plots.made_up import FRAMES, UNCERTAINTY, run
@@ -101,14 +99,6 @@ def test_the_paper_s_body_and_what_is_recommended_are_named():
     assert "ball clamped: graded quadratic, 1,194 surface nodes" in words(figure).replace("\n", " ")
 
 
-def test_where_nothing_is_accurate_enough_nothing_is_recommended():
-    figure = work.figure(LADDER[:3])
-    assert "recommended" not in words(figure.axes[0])
-    assert "No body is accurate enough and keeps the shape of its organ in ball clamped." in words(figure).replace(
-        "\n", " "
-    )
-
-
 def test_a_run_that_ended_with_a_fault_is_no_point():
     faulty = at(0.1, 0.1, status=Status.INVERTED)
     figure = work.figure([LADDER[0], faulty, run(BALL_CLAMPED, nodes=99)])
@@ -116,19 +106,6 @@ def test_a_run_that_ended_with_a_fault_is_no_point():
     text = words(figure).replace("\n", " ")
     assert f"failed: {faulty.case.name} inverted." in text
     assert "Not drawn (no frame times for this machine and code version): 1." in text
-
-
-def test_a_panel_names_what_its_scene_does_not_compare():
-    force, displacement = work.figure([at(0.1, 0.1, scene=BALL_SQUEEZE)]).axes
-    assert "compares no displacement" in words(displacement) and "compares" not in words(force)
-
-
-def test_every_scene_has_two_panels_below_one_another():
-    scenes = [scene for scene in JUDGED if scene.name != "ball_ringing"][:4]
-    figure = work.figure([at(0.1, 0.1, scene=scene) for scene in scenes])
-    shown = [axes for axes in figure.axes if axes.axison]
-    assert len(shown) == 2 * len(scenes)
-    assert [axes.get_title() != "" for axes in shown] == [True] * 3 + [False] * 3 + [True, False]
 
 
 def test_families_differ_without_colour():

@@ -1,7 +1,5 @@
 """A short timing is pinned, repeated, compiled before, and keeps to its seconds."""
 
-from dataclasses import replace
-
 import pytest
 
 from studies.base.errors import StudyError
@@ -46,11 +44,3 @@ def test_advice_times_what_was_timed_elsewhere(tmp_path, monkeypatch):
     assert advice.chosen.cost.uncertainty == pytest.approx(0.5 * 0.04 * 2.0 / 1.02)
     assert not advise(LIVER_PRESS, budget=1.0, results=results).meets
     assert advise(LIVER_PRESS, budget=1.0, results=results, timing=False).meets
-
-
-def test_advice_for_a_scene_that_was_never_run_is_timed_in_it(tmp_path, monkeypatch):
-    timed = []
-    monkeypatch.setattr(answers, "short_timing", lambda case: timed.append(case) or made_up(case))
-    mine = replace(LIVER_PRESS, name="mine", duration=9.0)
-    advise(mine, results=publish(tmp_path, rows_of(LIVER_PRESS)))
-    assert [case.scene for case in timed] == [mine]

@@ -1,7 +1,5 @@
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from studies.base.errors import StudyError
 from studies.metrics.timing.statistics import _sign_test_rank, kernel_ns, missed, percentiles, ratio_with_spread
@@ -10,13 +8,6 @@ from studies.metrics.timing.statistics import _sign_test_rank, kernel_ns, missed
 def test_percentiles_are_times_that_frames_took():
     assert percentiles(np.arange(1, 101).reshape(4, 25)) == {"p50": 51, "p95": 96, "p99": 100, "max": 100}
     assert percentiles(np.array([[7]])) == {"p50": 7, "p95": 7, "p99": 7, "max": 7}
-
-
-@given(st.lists(st.integers(1, 10**9), min_size=1, max_size=50))
-def test_percentiles_are_ordered_and_measured(times):
-    percentile_of = percentiles(np.array(times))
-    assert list(percentile_of.values()) == sorted(percentile_of.values())
-    assert set(percentile_of.values()) <= set(map(float, times))
 
 
 def test_a_deadline_is_missed_only_when_exceeded():
@@ -40,13 +31,6 @@ def test_a_slow_spell_that_hits_both_cancels():
     spell = np.array([1, 1, 7, 1, 3.0])[:, None]
     ratio = ratio_with_spread(spell * np.full((5, 4), 120.0), spell * np.full((5, 4), 100.0))
     assert (ratio.low, ratio.high) == pytest.approx((1.2, 1.2), rel=1e-12)
-
-
-def test_a_difference_within_the_spread_is_not_resolvable():
-    b = np.full((7, 4), 100.0)
-    ratio = ratio_with_spread(b * np.array([0.9, 0.98, 1.05, 1.06, 1.07, 1.1, 1.2])[:, None], b)
-    assert ratio.low < 1 < ratio.high
-    assert str(ratio).startswith("not resolvable (0.9")
 
 
 def test_four_repeats_resolve_nothing_however_clear():

@@ -2,16 +2,12 @@
 
 from dataclasses import replace
 
-import numpy as np
 import pytest
 
 from massspring import Free, simulate
 from studies.base.errors import StudyError
-from studies.metrics.run import Run
-from studies.metrics.table import metric
 from studies.metrics.timing import cases as module
-from studies.metrics.timing.cases import time_cases, timing_file, write_timing
-from studies.metrics.timing.protocol import FrameTiming
+from studies.metrics.timing.cases import time_cases, timing_file
 from studies.runs.current import case_path
 from studies.runs.prepare import prepare
 from studies.store import ledger
@@ -39,22 +35,6 @@ def test_a_file_beside_the_physics(results):
     assert record.fields["frame_ns"].unit == "ns"
     assert record.attributes["threads"] == 1
     assert "frame_ns" not in read_record(physics).fields
-
-
-@pytest.mark.campaign
-def test_timing_again_leaves_the_physics_alone(results):
-    before = content(results / "tiny")
-    time_cases(results, "tiny", [KEPT], lambda name: None)
-    after = content(results / "tiny")
-    changed = {name for name in after if after[name] != before[name]}
-    assert changed == {timing_file(results, "tiny", KEPT).name}
-    assert set(before) == set(after)
-
-
-def test_measured_frames_make_the_time_metrics_numbers(results):
-    record = read_record(case_path(results, "tiny", KEPT))
-    run = Run(KEPT, record, None, read_timing(results, KEPT))
-    assert all(metric(name)(run) > 0 for name in ("step_time", "frame_time", "frame_time_p99", "real_time"))
 
 
 def why_untimed(root, case):
@@ -125,13 +105,6 @@ def test_a_run_that_breaks_off_while_timed_is_not_stored(results, monkeypatch):
     with pytest.raises(StudyError, match=r"positive"):
         time_cases(results, "tiny", [KEPT], lambda name: None)
     assert content(results / "tiny") == before
-
-
-def test_a_timing_that_cannot_be_written_is_an_error(tmp_path):
-    (tmp_path / "file").write_text("no folder")
-    timing = FrameTiming(np.full((2, 3), 10))
-    with pytest.raises(StudyError, match="was not written"):
-        write_timing(tmp_path / "file", "tiny", KEPT, timing)
 
 
 def test_the_time_of_each_stage_is_stored_with_the_frames(finished_sweep):

@@ -8,7 +8,6 @@ from threadpoolctl import threadpool_info, threadpool_limits
 
 from studies.base.errors import StudyError
 from studies.metrics.timing.protocol import FrameTiming, interleave, pinned
-from studies.store.record import SCHEMA, Record, Status, read_record, write_record
 
 
 def test_pinned_to_one_core_and_one_thread_and_back():
@@ -36,19 +35,6 @@ def test_linear_algebra_uses_no_more_threads_than_the_timing():
         assert 2 in {pool["num_threads"] for pool in threadpool_info()}
         with pinned(threads=1):
             assert {pool["num_threads"] for pool in threadpool_info()} == {1}
-
-
-@pytest.mark.skipif(not hasattr(os, "sched_getaffinity"), reason="this system cannot pin")
-def test_as_many_cores_as_threads():
-    allowed = os.sched_getaffinity(0)
-    if len(allowed) < 2 or numba.config.NUMBA_NUM_THREADS < 2:
-        pytest.skip("this process may use one core only")
-    with pinned(threads=2) as core:
-        assert len(os.sched_getaffinity(0)) == 2
-        assert core in os.sched_getaffinity(0)
-        assert numba.get_num_threads() == 2
-    with pytest.raises(StudyError, match="threads need as many cores"), pinned(threads=len(allowed) + 1):
-        pass
 
 
 def test_turns_are_taken_and_the_warm_up_is_thrown_away():
@@ -86,19 +72,3 @@ def test_a_contestant_that_changes_its_frames_is_named():
 def test_impossible_frame_times_are_refused(frame_ns):
     with pytest.raises(StudyError, match="frame times must be positive"):
         FrameTiming(frame_ns)
-
-
-def test_a_stage_needs_a_name():
-    with pytest.raises(StudyError, match="one name per row"):
-        FrameTiming(np.ones((1, 2)), stage_ns=np.ones((2, 2)), stages=("springs",))
-
-
-def test_a_timing_survives_the_store(tmp_path):
-    frame_ns = np.arange(1, 7).reshape(2, 3)
-    timing = FrameTiming(frame_ns, core=1, stage_ns=np.ones((2, 3)), stages=("springs", "volume"))
-    record = Record(SCHEMA, "timing", "{}", "x", Status.OK, "", "f", "01234567", timing.attributes(), timing.fields())
-    write_record(tmp_path / "x.h5", record)
-    back = read_record(tmp_path / "x.h5")
-    np.testing.assert_array_equal(back.fields["frame_ns"].values, frame_ns)
-    assert tuple(back.fields["stages"].values) == ("springs", "volume")
-    assert back.attributes == {"core": 1, "threads": 1, "repeats": 2}

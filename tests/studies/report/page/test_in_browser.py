@@ -94,19 +94,6 @@ def test_slider_play_and_picture_obey_keys(visit):
         assert (picture(page) == front).all(), key
 
 
-def test_dragging_turns_and_the_button_turns_back(visit):
-    page = visit()
-    page.locator("#canvas").scroll_into_view_if_needed()
-    front, box = picture(page), page.locator("#canvas").bounding_box()
-    page.mouse.move(box["x"] + 200, box["y"] + 150)
-    page.mouse.down()
-    page.mouse.move(box["x"] + 320, box["y"] + 190, steps=4)
-    page.mouse.up()
-    assert (np.abs(picture(page) - front) > 30).any()
-    page.click("#home")
-    assert (picture(page) == front).all()
-
-
 def test_an_entry_from_outside_is_filtered_sorted_and_replayed_under_its_own_name(visit):
     page = visit()
     page.get_by_label("Filter").fill("entry")

@@ -8,20 +8,18 @@ import re
 import shutil
 from dataclasses import replace
 from html.parser import HTMLParser
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
 
-from studies.catalog import Chart
 from studies.metrics.table import study_table
 from studies.report.page import write as module
 from studies.report.page.markup import script_json
-from studies.report.page.part import part_path, read_part, results_option, write_part
+from studies.report.page.part import part_path, read_part, write_part
 from studies.report.page.svg import inline
-from studies.report.page.write import ASSETS, SCRIPTS, write_page
-from studies.report.results import draw_charts, report
+from studies.report.page.write import write_page
+from studies.report.results import report
 from studies.store.ledger import Ledger
 from tests.studies.plots.made_up import POINTS, STRETCH
 from tests.studies.report.page.made_up_page import COLUMNS, HELD, MOMENTS, NASTY, losses, made_up_parts, rates, theirs
@@ -220,20 +218,6 @@ def test_what_has_no_room_in_the_page_lies_beside_it(kept, page, tmp_path, monke
     assert inside["pieces"] | loaded == whole["pieces"] and not set(inside["pieces"]) & set(loaded)
 
 
-def test_a_page_says_what_it_lacks_and_which_body_misses_the_target(kept):
-    parts = [(study, read_part(kept[0], study)) for study in kept[1]]
-    given = {"cases": {}}
-    bare = module.page([(study, part | {"best": [], "charts": [], "rows": []}) for study, part in parts], given, {})
-    for sentence in ("No body can be named yet", "None yet: nothing that a finding", "No charts yet."):
-        assert sentence in bare.decode()
-    number = [1.0, 0.1]
-    row = {"scene": NASTY, "target": "any", "meets": False, "order": [0.0], "body": "ball, 9, 1", "case": "0"}
-    row |= {"force": number, "displacement": number, "shape": None, "speed": None, "paper": None}
-    missed = module.page([(study, part | {"best": [row]}) for study, part in parts], given, {}).decode()
-    assert "misses the target</span>" in missed and NASTY not in missed and Parsed(missed).wrong == []
-    assert "misses the target</span>" not in bare.decode()
-
-
 def test_without_results_there_is_no_page(tmp_path):
     assert write_page(tmp_path, [tiny_study()]) == (None, []) and not (tmp_path / "report.html").exists()
 
@@ -295,19 +279,6 @@ def test_commands_name_the_file_of_an_own_study(kept, tmp_path, monkeypatch):
     assert len(runs) == len(losses()) and all(run.startswith("organbench run 'my rod.py' --case ") for run in runs)
 
 
-@pytest.mark.parametrize(
-    ("root", "option"),
-    [("results", ""), ("results/demo", "--results results/demo"), ("/private/mine", "--results mine")],
-)
-def test_commands_name_the_results_folder(root, option):
-    assert results_option(Path(root)) == option.split()
-
-
-def test_a_chart_that_keeps_no_svg_is_left_out_with_a_remark(results):
-    study = tiny_study(charts=(Chart("own.png", lambda runs, path: path.write_bytes(b"own")),))
-    assert any("chart own.png is omitted" in remark for remark in report(Ledger(results), [study])[1])
-
-
 def test_charts_are_the_same_again_small_and_without_what_a_page_has_no_use_for(kept, tmp_path):
     made_up_parts(tmp_path)
     charts = [read_part(root, kept[1][0])["charts"] for root in (kept[0], tmp_path)]
@@ -321,20 +292,3 @@ def test_charts_are_the_same_again_small_and_without_what_a_page_has_no_use_for(
         used = set(re.findall(r"(?:url\(#|href=\"#)([^\")]+)", shown))
         assert used <= set(Parsed(shown).ids()) and all(name.startswith("c-") for name in used)
     assert "data:image/png" in charts[0][1]["svg"]  # faces, which may be thousands, as a picture
-
-
-def test_pictures_are_as_without_copies(kept, tmp_path):
-    """Keeping an SVG changes no PNG."""
-    study = kept[1][0]
-    draw_charts(tmp_path, study, losses())
-    for chart in study.charts:
-        name = f"{study.name}/{chart.file}"
-        assert (tmp_path / name).read_bytes() == (kept[0] / name).read_bytes()
-
-
-def test_scripts_and_style_are_small_and_belong_to_the_package():
-    files = sorted(path.name for path in ASSETS.iterdir())
-    assert files == sorted([*SCRIPTS, "league.html", "page.css", "page.html"])
-    assert all(len(path.read_text(encoding="utf-8").splitlines()) <= 250 for path in ASSETS.iterdir())
-    settings = (ASSETS.parents[3] / "pyproject.toml").read_text(encoding="utf-8")
-    assert "report/page/assets/*" in settings

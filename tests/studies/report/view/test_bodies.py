@@ -57,12 +57,6 @@ def test_a_body_that_ended_early_stays_where_it_was_and_shows_no_numbers(solutio
     assert body.volume_ratio[0] == 0.9 and np.isnan(body.volume_ratio[1])
 
 
-def test_a_run_without_any_checkpoint_stays_at_rest():
-    nothing = {"snapshots": np.empty((0, *POINTS.shape)), "snapshot_frame": np.empty(0, int)}
-    body = shown_run(run(values=nothing), None, "broke at once")
-    np.testing.assert_array_equal(body.positions, [POINTS, POINTS])
-
-
 def vertex_volumes(x, cells) -> np.ndarray:
     a, b, c, d = (x[cells[:, k]] for k in range(4))
     return np.einsum("ni,ni->n", np.cross(b - a, c - a), d - a) / 6

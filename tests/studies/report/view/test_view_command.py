@@ -1,7 +1,6 @@
 """`organbench view`: which cases words name, what is listed, what is missing, and bad input."""
 
 import shutil
-import time
 from dataclasses import replace
 
 import h5py
@@ -9,8 +8,7 @@ import numpy as np
 import pytest
 
 from massspring import Free
-from studies.report.view.stored import listing
-from studies.scene.library import BALL_CLAMPED, BALL_RINGING
+from studies.scene.library import BALL_RINGING
 from studies.store.record import Status, read_record, write_record
 from tests.studies.made_up_run import SCENE
 from tests.studies.report.view.made import stored_case, stored_reference
@@ -89,15 +87,6 @@ def test_a_warning_names_what_is_missing_and_the_rest_is_shown(root, tmp_path, o
         assert "error" not in file["VTKHDF/PointData"]
 
 
-def test_a_reference_alone_can_be_viewed(tmp_path, organbench):
-    stored_reference(tmp_path, BALL_CLAMPED)
-    code, _, err = organbench("view", "ball_clamped", "-o", tmp_path / "a.vtkhdf", "--results", tmp_path)
-    assert (code, err) == (0, "")
-    assert len(names_in(tmp_path / "a.vtkhdf")) == 1
-    code, out, _ = organbench("view", "--results", tmp_path)
-    assert code == 0 and out.startswith("ball_clamped: 0 cases, reference ball_clamped-")
-
-
 @pytest.mark.parametrize(
     ("words", "sentence"),
     [
@@ -124,11 +113,6 @@ def test_what_does_not_belong_in_one_file_is_refused(root, refused):
     assert "have different checkpoints" in refused("view", "ball_clamped", "--results", root)
 
 
-def test_files_of_other_kinds_are_refused(root, refused):
-    (reference,) = (root / "reference").iterdir()
-    assert "has no run to view" in refused("view", reference, "--results", root)
-
-
 def test_files_of_an_earlier_version_are_one_warning(root, organbench):
     with h5py.File(root / "made" / "old-00000001.h5", "w") as file:
         file.attrs["schema"] = 1
@@ -136,14 +120,3 @@ def test_files_of_an_earlier_version_are_one_warning(root, organbench):
     code, out, err = organbench("view", "--results", root)
     assert code == 0 and out.startswith("ball_clamped: 2 cases, ")
     assert len(err.splitlines()) == 1 and "(and 1 more files)" in err
-
-
-def test_two_hundred_files_are_listed_in_five_seconds(tmp_path):
-    """Of this process; every file is read and held to its checksums, and as they are equal they are one case."""
-    path = stored_case(tmp_path)
-    for number in range(199):
-        shutil.copy(path, path.with_name(f"copy-{number:08d}.h5"))
-    begun = time.process_time()
-    (head, _), problems = listing(tmp_path)
-    assert time.process_time() - begun < 5.0
-    assert head.startswith("ball_clamped: 1 case, ") and problems == []
