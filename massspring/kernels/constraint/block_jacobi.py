@@ -5,8 +5,7 @@ import math
 
 from massspring.kernels.arrays.volume_rows import SIZE
 from massspring.kernels.jit.decorators import njit_exposed, njit_inlined
-from massspring.kernels.jit.flat import flat
-from massspring.kernels.jit.vectors import add_product, lanes_of, load, save, spread
+from massspring.kernels.jit.vectors import add_product, put_row, row_of, spread_row
 
 
 @njit_exposed
@@ -20,14 +19,13 @@ def scale_into(clusters, diagonal):
 
 @njit_inlined
 def answer(inverse, first, part):
-    """part[1] = inverse · part[0] for the cluster that begins at row `first`; the inverse is symmetric, so that its
-    rows serve as columns."""
-    answers = flat(part, 1, 2)
-    for lane in range(0, SIZE, lanes_of(inverse)):
-        total = spread(0.0, inverse)
-        for k in range(SIZE):
-            total = add_product(total, load(inverse, first + k, lane), spread(part[0, k], inverse))
-        save(total, answers, lane)
+    """part[1] = inverse · part[0] for the cluster that begins at row `first`; its rows serve as columns, as
+    the inverse is symmetric, and all sums stay in vector registers."""
+    total = spread_row(0.0, row_of(inverse, first, SIZE))
+    for k in range(SIZE):
+        column = row_of(inverse, first + k, SIZE)
+        total = add_product(total, column, spread_row(part[0, k], column))
+    put_row(total, part, 1)
 
 
 @njit_exposed

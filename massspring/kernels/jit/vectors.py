@@ -61,19 +61,24 @@ def add_product(total: Any, a: Any, b: Any) -> Any:
     return total + a * b
 
 
+def row_of(table: np.ndarray, row: int, count: int) -> Any:
+    """The numbers of a row; `table` (n, count), the count a constant."""
+    return table[row].copy()
+
+
 def four(padded: np.ndarray, row: int) -> Any:
     """The numbers of a row; `padded` (n, 4)."""
     return padded[row].copy()
 
 
-def put_four(vector: Any, padded: np.ndarray, row: int) -> None:
+def put_row(vector: Any, table: np.ndarray, row: int) -> None:
     """Stores them."""
-    padded[row] = vector
+    table[row] = vector
 
 
-def spread_four(number: Any, like: Any) -> Any:
-    """One number in four lanes, in the precision of `like`, a table or a vector."""
-    return np.full(4, number, dtype=like.dtype)
+def spread_row(number: Any, like: Any) -> Any:
+    """One number in all lanes of a vector like `like`, or in four lanes in the precision of the table `like`."""
+    return np.full(like.shape[-1], number, dtype=like.dtype)
 
 
 def doubled(vector: Any) -> Any:
@@ -146,10 +151,10 @@ def _lanes(context: Any, builder: Any, signature: Any, args: Any) -> Any:
     return context.get_constant(types.intp, 8 * BYTES // signature.args[0].dtype.bitwidth)
 
 
-@lower_builtin(spread_four, types.Number, Vector)
+@lower_builtin(spread_row, types.Number, Vector)
 @_generates(
-    spread_four,
-    lambda number, like: Vector(like.real if isinstance(like, Vector) else like.dtype, 4),
+    spread_row,
+    lambda number, like: like if isinstance(like, Vector) else Vector(like.dtype, 4),
     types.Number,
     types.Array,
 )
@@ -285,24 +290,29 @@ def _add_product(context: Any, builder: Any, signature: Any, args: Any) -> Any:
     return _called(builder, "fmuladd", args[1], args[2], args[0])
 
 
+@_generates(
+    row_of,
+    lambda table, row, count: Vector(table.dtype, count.literal_value) if hasattr(count, "literal_value") else None,
+    types.Array,
+    types.Integer,
+    types.Integer,
+)
 @_generates(four, lambda padded, row: Vector(padded.dtype, 4), types.Array, types.Integer)
-def _four(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-    pointer = _row_of_four(context, builder, signature.args, args)
+def _row(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+    pointer = _row_at(context, builder, signature.args, args, context.get_value_type(signature.return_type))
     return builder.load(pointer, align=_bytes(signature.args[0]))
 
 
-def _row_of_four(context: Any, builder: Any, kinds: Any, args: Any) -> Any:
-    """Pointer to a row of a table (n, 4)."""
+def _row_at(context: Any, builder: Any, kinds: Any, args: Any, vector: Any) -> Any:
+    """Pointer to a row that is a vector."""
     base, word = context.make_array(kinds[0])(context, builder, args[0]).data, context.get_value_type(types.intp)
     row = context.cast(builder, args[1], kinds[1], types.intp)
-    return builder.bitcast(
-        builder.gep(base, [builder.mul(row, word(4))]), ir.VectorType(base.type.pointee, 4).as_pointer()
-    )
+    return builder.bitcast(builder.gep(base, [builder.mul(row, word(vector.count))]), vector.as_pointer())
 
 
-@_generates(put_four, lambda vector, padded, row: types.void, Vector, types.Array, types.Integer)
-def _put_four(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-    pointer = _row_of_four(context, builder, signature.args[1:], args[1:])
+@_generates(put_row, lambda vector, table, row: types.void, Vector, types.Array, types.Integer)
+def _put_row(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+    pointer = _row_at(context, builder, signature.args[1:], args[1:], args[0].type)
     builder.store(args[0], pointer, align=_bytes(signature.args[1]))
     return context.get_dummy_value()
 
