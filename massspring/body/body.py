@@ -115,18 +115,13 @@ class Body:
 
     def _check_springs(self) -> None:
         springs = self.springs
-        if springs.count and int(springs.ends.max()) >= len(self.rest):
-            raise MassSpringError(
-                f"a spring ends at node {int(springs.ends.max())}, but there are {len(self.rest)} nodes"
-            )
+        for what, nodes in (("spring ends at", springs.ends), ("triangle spring names", self.membrane.triangles)):
+            last = int(nodes.max(initial=0))
+            if last >= len(self.rest):
+                raise MassSpringError(f"a {what} node {last}, but there are {len(self.rest)} nodes")
         check_finite("spring stiffnesses", springs.stiffness)
         for values in self.membrane[1:]:
             check_finite("triangle springs", values)
-        if len(self.membrane.triangles) and int(self.membrane.triangles.max()) >= len(self.rest):
-            raise MassSpringError(
-                f"a triangle spring names node {int(self.membrane.triangles.max())}, "
-                f"but there are {len(self.rest)} nodes"
-            )
         length = lengths(self.rest, springs.ends) if self.rest_pressure else springs.rest_length
         if not (length > 0).all():
             worst = int(np.argmin(length))

@@ -2,14 +2,20 @@
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from massspring.errors import MassSpringError
 
-if TYPE_CHECKING:
-    pass
+
+def _check_keys(what: str, times: tuple[float, ...], named: str, values: tuple, units: str = "") -> None:
+    """Raises MassSpringError for keys that do not make a function of time."""
+    if len(times) != len(values) or not times:
+        raise MassSpringError(f"a {what} has {len(times)} times for {len(values)} {named}; give one each")
+    if not (np.isfinite(times).all() and np.isfinite(values).all()):
+        raise MassSpringError(f"a {what} holds values that are not finite; give numbers{units}")
+    if (np.diff(times) <= 0).any():
+        raise MassSpringError(f"the times of a {what} are {times} s; they must ascend")
 
 
 @dataclass(frozen=True)
@@ -22,14 +28,7 @@ class Trajectory:
     """[m] from the position at rest, one per time."""
 
     def __post_init__(self) -> None:
-        if len(self.times) != len(self.displacements) or not self.times:
-            raise MassSpringError(
-                f"a path has {len(self.times)} times for {len(self.displacements)} displacements; give one each"
-            )
-        if not (np.isfinite(self.times).all() and np.isfinite(self.displacements).all()):
-            raise MassSpringError("a path holds values that are not finite; give numbers in seconds and metres")
-        if (np.diff(self.times) <= 0).any():
-            raise MassSpringError(f"the times of a path are {self.times} s; they must ascend")
+        _check_keys("path", self.times, "displacements", self.displacements, " in seconds and metres")
 
     def __call__(self, t: float | np.ndarray) -> np.ndarray:
         """Displacement [m] at time(s) `t` [s], (3,) or (q, 3)."""
@@ -58,12 +57,7 @@ class Ramp:
     """One per time."""
 
     def __post_init__(self) -> None:
-        if len(self.times) != len(self.values) or not self.times:
-            raise MassSpringError(f"a ramp has {len(self.times)} times for {len(self.values)} values; give one each")
-        if not (np.isfinite(self.times).all() and np.isfinite(self.values).all()):
-            raise MassSpringError("a ramp holds values that are not finite; give numbers")
-        if (np.diff(self.times) <= 0).any():
-            raise MassSpringError(f"the times of a ramp are {self.times} s; they must ascend")
+        _check_keys("ramp", self.times, "values", self.values)
 
     def __call__(self, t: float | np.ndarray) -> np.ndarray:
         """Value at time(s) `t` [s], () or (q,)."""
