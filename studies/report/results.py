@@ -3,6 +3,7 @@
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -120,52 +121,72 @@ def refresh(ledger: Ledger, study: Study, references: References | None = None) 
 
     references: those of the ledger, where other studies need them too.
     """
-    folder, state = study_folder(ledger.root, study.name), state_of_study(ledger, study)
-    paths = [*(folder / chart.file for chart in study.charts), folder / f"{study.name}.csv"]
-    paths += [ledger.root / file for file in SUMMARIES.get(study.name, ())]
-    before = _stamped(ledger.root / "cache" / f"{study.name}.drawn.json")
-    current = before.get("inputs") == state and all(path.exists() for path in paths)
-    if current and read_part(ledger.root, study) is not None:
-        return paths, before["remarks"]
-    return paths, draw(load(ledger, study, references or References(ledger)), state)
+    return StudyDrawing(ledger, study, references or References(ledger)).refreshed()
 
 
 @dataclass(frozen=True)
-class Loaded:
-    """A study with all that its charts and tables show."""
+class StudyDrawing:
+    """All that is drawn and written of a study, from what is stored of it."""
 
-    root: Path
+    ledger: Ledger
     study: Study
-    runs: list[Run]
-    submissions: list[Run]
-    """Results of other programs in its scenes."""
-    remarks: list[str]
-    """What is missing, in sentences."""
+    references: References
 
+    @cached_property
+    def folder(self) -> Path:
+        """Of its charts and its table."""
+        return study_folder(self.ledger.root, self.study.name)
 
-def load(ledger: Ledger, study: Study, references: References) -> Loaded:
-    """Reads all that is stored of a study."""
-    runs, remarks = load_runs(ledger.root, study, references)
-    submissions, unreadable = entries_beside(ledger.root, study.scenes, references.of)
-    return Loaded(ledger.root, study, runs, submissions, [*remarks, *unreadable])
+    @cached_property
+    def stamp(self) -> Path:
+        """Names the state that was drawn last, and what was missing then."""
+        return self.ledger.root / "cache" / f"{self.study.name}.drawn.json"
 
+    @property
+    def paths(self) -> list[Path]:
+        """Of all charts and tables."""
+        charts = [*(self.folder / chart.file for chart in self.study.charts), self.folder / f"{self.study.name}.csv"]
+        return charts + [self.ledger.root / file for file in SUMMARIES.get(self.study.name, ())]
 
-def draw(loaded: Loaded, state: str) -> list[str]:
-    """Writes tables, summaries, charts and the part of the page; what is missing, in sentences. state: kept, so that
-    nothing is drawn until it changes."""
-    from studies.plots.style.style import svg_copies  # with matplotlib, which takes half a second to load
+    @cached_property
+    def state(self) -> str:
+        """Hash of all that charts and tables are made from: the lines of the ledger, and the code, that of the user's
+        files too."""
+        ledger, study = self.ledger, self.study
+        jobs, machine = case_jobs(ledger.root, study), shown_machine(ledger.root)
+        others = [*(ledger.timing(job, machine) for job in jobs), *ledger.files(SUBMISSIONS).values()]
+        metrics = [metric(column) for column in study.columns]
+        drawings = [entry.of for entry in metrics] + [chart.drawing for chart in study.charts]
+        own = {file.sha256 for file in map(file_of, drawings) if file is not None}
+        names = [*(job.digest for job in jobs), *(entry.name for entry in metrics), *sorted(own), study.word]
+        files = ledger.state([*jobs, *reference_jobs(ledger.root, study.scenes)])
+        return state_of(files, *(entry.written if entry else "-" for entry in others), *names)
 
-    root, study, runs = loaded.root, loaded.study, [*loaded.runs, *loaded.submissions]
-    rows = study_table(runs, study.columns)
-    write_table(study_folder(root, study.name) / f"{study.name}.csv", rows)
-    for file, text in SUMMARIES.get(study.name, {}).items():
-        write_whole(root / file, (text(loaded.runs) + "\n").encode())
-    with svg_copies() as pictures:
-        draw_charts(root, study, runs)
-    write_part(root, study, runs, rows, pictures)
-    stamp = {"inputs": state, "remarks": loaded.remarks}
-    write_whole(root / "cache" / f"{study.name}.drawn.json", json.dumps(stamp).encode())
-    return loaded.remarks
+    def refreshed(self) -> tuple[list[Path], list[str]]:
+        """What `refresh` says."""
+        before = _stamped(self.stamp)
+        current = before.get("inputs") == self.state and all(path.exists() for path in self.paths)
+        if current and read_part(self.ledger.root, self.study) is not None:
+            return self.paths, before["remarks"]
+        return self.paths, self.drawn()
+
+    def drawn(self) -> list[str]:
+        """Writes tables, summaries, charts and the part of the page; what is missing, in sentences."""
+        from studies.plots.style.style import svg_copies  # with matplotlib, which takes half a second to load
+
+        root, study = self.ledger.root, self.study
+        own, remarks = load_runs(root, study, self.references)
+        submissions, unreadable = entries_beside(root, study.scenes, self.references.of)
+        runs, remarks = [*own, *submissions], [*remarks, *unreadable]
+        rows = study_table(runs, study.columns)
+        write_table(self.folder / f"{study.name}.csv", rows)
+        for file, text in SUMMARIES.get(study.name, {}).items():
+            write_whole(root / file, (text(own) + "\n").encode())
+        with svg_copies() as pictures:
+            draw_charts(root, study, runs)
+        write_part(root, study, runs, rows, pictures)
+        write_whole(self.stamp, json.dumps({"inputs": self.state, "remarks": remarks}).encode())
+        return remarks
 
 
 def _stamped(stamp: Path) -> dict[str, Any]:
@@ -176,19 +197,6 @@ def _stamped(stamp: Path) -> dict[str, Any]:
         return {}
     valid = isinstance(before, dict) and isinstance(before.get("inputs"), str)
     return before if valid and isinstance(before.get("remarks"), list) else {}
-
-
-def state_of_study(ledger: Ledger, study: Study) -> str:
-    """Hash of all that charts and tables are made from: the lines of the ledger, and the code, that of the user's files
-    too."""
-    jobs, machine = case_jobs(ledger.root, study), shown_machine(ledger.root)
-    others = [*(ledger.timing(job, machine) for job in jobs), *ledger.files(SUBMISSIONS).values()]
-    metrics = [metric(column) for column in study.columns]
-    drawings = [entry.of for entry in metrics] + [chart.drawing for chart in study.charts]
-    own = {file.sha256 for file in map(file_of, drawings) if file is not None}
-    names = [*(job.digest for job in jobs), *(entry.name for entry in metrics), *sorted(own), study.word]
-    files = ledger.state([*jobs, *reference_jobs(ledger.root, study.scenes)])
-    return state_of(files, *(entry.written if entry else "-" for entry in others), *names)
 
 
 def draw_figures(root: Path) -> list[Path]:
