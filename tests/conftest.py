@@ -11,9 +11,8 @@ import pytest
 from numba.core import event
 
 from studies.base import processes
-from studies.base.compile_watch import EVENT, Compiled, CompileWatch
+from studies.base.compile_watch import EVENT, Compiled, CompileWatch, summary
 from studies.geometry.mesher import process
-from studies.sweep.compiling.log import summary
 from tests import copies
 
 PATIENCE = 900.0

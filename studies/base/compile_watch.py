@@ -1,7 +1,7 @@
 """Which functions numba compiles, as it begins and ends; what it finds in its cache is not listed."""
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import NamedTuple
@@ -64,3 +64,18 @@ def watching(begun: Callable[[str], object] = lambda name: None) -> Iterator[Com
     watch = CompileWatch(begun)
     with event.install_listener(EVENT, watch):
         yield watch
+
+
+def summary(compiled: Iterable[Compiled], most: int = 10) -> list[str]:
+    """Lines: how much was compiled, how much of it twice, and the `most` functions that took longest."""
+    entries = list(compiled)
+    distinct = {(entry.function, entry.arguments) for entry in entries}
+    total = sum(entry.seconds for entry in entries)
+    lines = [
+        f"{len(entries)} compiled in {total:.1f} s of processor time, {len(entries) - len(distinct)} of them again"
+    ]
+    functions: dict[str, list[float]] = {}
+    for entry in entries:
+        functions.setdefault(entry.function, []).append(entry.seconds)
+    by_time = sorted(functions.items(), key=lambda item: -sum(item[1]))
+    return lines + [f"{sum(times):8.2f} s  {len(times):3d} x  {name}" for name, times in by_time[:most]]

@@ -1,6 +1,6 @@
 """The body of a scene after its cut, and the event that introduces it into a run."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -49,22 +49,27 @@ def pieces_of(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
 def check_blades(scene: Scene, kind: str) -> None:
     """Raises DoesNotApply for a surface body (`kind`) if a cut of the scene ends inside it or advances, or if there are
     several cuts."""
-    words = f"the surface body does not apply to scene '{scene.name}'"
-    for cut in scene.cuts if kind == "surface" else ():
-        if cut.until is not None:
-            raise DoesNotApply(
-                f"{words}: cut '{cut.name}' advances, and this body is cut in pieces at once; leave until out, or take "
-                "a tetrahedral body"
-            )
-        if cut.within is not None:
-            raise DoesNotApply(
-                f"{words}: cut '{cut.name}' ends inside the organ, where this body has no tissue; cut the whole "
-                "section (within=None), or take a tetrahedral body"
-            )
-        if len(scene.cuts) > 1:
-            raise DoesNotApply(
-                f"{words}: it has {len(scene.cuts)} cuts, and this body is cut once; take a tetrahedral body"
-            )
+    if kind != "surface":
+        return
+    several = f"it has {len(scene.cuts)} cuts, and this body is cut once; take a tetrahedral body"
+    for cut in scene.cuts:
+        advances = (
+            f"cut '{cut.name}' advances, and this body is cut in pieces at once; leave until out, or take a "
+            "tetrahedral body"
+        )
+        ends = (
+            f"cut '{cut.name}' ends inside the organ, where this body has no tissue; cut the whole section "
+            "(within=None), or take a tetrahedral body"
+        )
+        reasons = {advances: cut.until is not None, ends: cut.within is not None, several: len(scene.cuts) > 1}
+        _refuse(f"the surface body does not apply to scene '{scene.name}': ", reasons)
+
+
+def _refuse(words: str, reasons: Mapping[str, bool]) -> None:
+    """Raises DoesNotApply for the first reason that holds."""
+    reason = next((reason for reason, holds in reasons.items() if holds), None)
+    if reason is not None:
+        raise DoesNotApply(words + reason)
 
 
 def surface_pieces(body: Body, later: Opened, axis: str) -> Pieces:
@@ -151,27 +156,15 @@ def event_of(
 
 def check_virtual(scene: Scene) -> None:
     """Raises DoesNotApply for a scene that virtual nodes cannot cut."""
-    if len(scene.cuts) > 1:
-        raise DoesNotApply(
-            f"virtual nodes do not apply to scene '{scene.name}', which has {len(scene.cuts)} cuts; take cut "
-            "'conforming'"
-        )
-    if scene.cut is None:
-        raise DoesNotApply(f"virtual nodes do not apply to scene '{scene.name}': it has no cut; leave cut out")
-    if scene.cut.until is not None:
-        raise DoesNotApply(
-            f"virtual nodes do not apply to scene '{scene.name}', whose cut advances; leave until out, or take cut "
-            "'conforming'"
-        )
-    if scene.cut.opens_lumen:
-        raise DoesNotApply(
-            f"virtual nodes do not apply to scene '{scene.name}', whose cut opens a lumen; take cut 'conforming'"
-        )
-    if scene.cut.contact:
-        raise DoesNotApply(
-            f"virtual nodes do not apply to scene '{scene.name}', whose faces of the cut touch: no node lies on them; "
-            "take cut 'conforming'"
-        )
+    cuts, other = scene.cuts, "take cut 'conforming'"
+    reasons = {
+        f", which has {len(cuts)} cuts; {other}": len(cuts) > 1,
+        ": it has no cut; leave cut out": not cuts,
+        f", whose cut advances; leave until out, or {other}": any(cut.until is not None for cut in cuts),
+        f", whose cut opens a lumen; {other}": any(cut.opens_lumen for cut in cuts),
+        f", whose faces of the cut touch: no node lies on them; {other}": any(cut.contact for cut in cuts),
+    }
+    _refuse(f"virtual nodes do not apply to scene '{scene.name}'", reasons)
 
 
 def opening_of(frame: int, after: Body, triangles: np.ndarray, pairs: np.ndarray) -> Opening:

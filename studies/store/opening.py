@@ -4,11 +4,9 @@ The seal is checked before the HDF5 library sees the file: single bits send the 
 """
 
 import hashlib
-import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import BinaryIO
 
 import h5py
 
@@ -27,23 +25,24 @@ SEAL = 160
 LABEL = b"\norganbench results; bytes and SHA-256 of what precedes these 160: "
 FORMER_LABEL = b"organbench results; "
 """How files of organbench 0.2 begin, which had their checksum there."""
-CHUNK = 1 << 20
 
 
 def sealed(image: bytes) -> bytes:
     """The HDF5 file `image` with its length and digest behind it."""
-    return image + _seal(len(image), hashlib.sha256(image).hexdigest())
+    return image + seal_of(image)
+
+
+def seal_of(image: bytes | memoryview) -> bytes:
+    """The SEAL bytes that belong behind an HDF5 file."""
+    return (LABEL + f"{len(image)} {hashlib.sha256(image).hexdigest()}".encode()).ljust(SEAL - 1) + b"\n"
 
 
 def check_seal(path: Path) -> None:
     """Raises DamagedFile unless every byte of a file is as it was written, OtherVersion for HDF5 without a seal, and
     OSError; about a millisecond per megabyte."""
-    with open(path, "rb") as file:
-        head, size = file.read(len(FORMER_LABEL)), file.seek(0, os.SEEK_END)
-        file.seek(0)
-        digest = _digest(file, size - SEAL)
-        tail = file.read()
-    if tail == _seal(size - SEAL, digest):
+    content = memoryview(path.read_bytes())
+    head, tail, size = bytes(content[: len(FORMER_LABEL)]), bytes(content[-SEAL:]), len(content)
+    if tail == seal_of(content[:-SEAL]):
         return
     is_hdf5 = head.startswith(SIGNATURE)
     other_format = is_hdf5 and head[len(SIGNATURE) :][:1] != bytes([SUPERBLOCK])
@@ -94,16 +93,3 @@ def _without_lock(path: Path) -> h5py.File:
         if "locking flag values don't match" not in str(problem):
             raise
         return h5py.File(path, "r")
-
-
-def _digest(file: BinaryIO, length: int) -> str:
-    """SHA-256 (hex) of the next `length` bytes."""
-    digest = hashlib.sha256()
-    while length > 0 and (chunk := file.read(min(length, CHUNK))):
-        digest.update(chunk)
-        length -= len(chunk)
-    return digest.hexdigest()
-
-
-def _seal(length: int, digest: str) -> bytes:
-    return (LABEL + f"{length} {digest}".encode()).ljust(SEAL - 1) + b"\n"

@@ -1,7 +1,6 @@
 """Who runs the jobs of a sweep: processes here (studies.sweep.local) or on a cluster (studies.sweep.engines)."""
 
 from collections.abc import Callable, Generator, Sequence
-from contextlib import closing
 from pathlib import Path
 from typing import Protocol
 
@@ -62,21 +61,3 @@ class Executor(Protocol):
     ) -> int:
         """Times alone what is not timed yet of a study, of `among` (absolute paths) where given; how many that were."""
         ...
-
-
-def perform(
-    executor: Executor,
-    jobs: Sequence[Job],
-    progress: Progress,
-    on_compile: CompileListener,
-    on_death: Callable[[Job, str], object],
-) -> None:
-    """Does the jobs; `on_death` gets those whose process died, with the cause. Ctrl-C keeps what is stored."""
-    if not jobs:
-        return
-    progress.begin("physics", len(jobs))
-    with closing(executor.map(jobs, on_compile)) as ended:
-        for job, cause in ended:
-            if cause is not None:
-                on_death(job, cause)
-            progress.advance("physics", job.label)

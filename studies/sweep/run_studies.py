@@ -1,17 +1,43 @@
 """A study from start to end: what is stale runs, the rest stays; references and physics in parallel, timing alone."""
 
 from collections.abc import Callable
-from dataclasses import replace
+from contextlib import closing
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from studies.base.atomic import write_whole
 from studies.catalog.study import Study
 from studies.store.archived import check_no_archive
 from studies.store.ledger import Ledger
-from studies.sweep.executor import CompileListener, Executor, Progress, perform
-from studies.sweep.failures import Failures
+from studies.sweep.executor import CompileListener, Executor, Progress
 from studies.sweep.job import Job, jobs_of
 from studies.sweep.local import Local
+
+
+@dataclass
+class Failures:
+    """What failed in a sweep because its process died or its file cannot be written, with the cause."""
+
+    causes: dict[str, str] = field(default_factory=dict)
+    """Label of a job -> why."""
+
+    def add(self, job: Job, cause: str) -> None:
+        """Notes a job and stores it as failed. Raises StudyError when it cannot be stored."""
+        self.causes[job.label] = cause
+        job.store_failure(cause)
+
+    def can_store(self, job: Job) -> bool:
+        """Whether the file of a job can be written; notes a folder in its place as the cause of a failure."""
+        path = job.path
+        if path.is_dir():
+            self.causes[job.label] = f"{path} is a folder where a file belongs: delete it"
+        return not path.is_dir()
+
+    def sentence(self, again: str) -> str:
+        """All of them in one sentence; again: the command that tries them once more."""
+        (label, cause), *others = self.causes.items()
+        more = f", and {len(others)} more" if others else ""
+        return f"failed: {label} ({cause}){more}; all others are done, `{again}` retries"
 
 
 def run_studies(
@@ -35,7 +61,6 @@ def run_studies(
     check_no_archive(root)
     root = root.absolute()
     executor, ledger = Local(jobs) if isinstance(jobs, int) else jobs, ledger or Ledger(root)
-
     rule = selection or (lambda job: ledger.why(job) is not None)
     ledger.look_again()
     stored = [(job, ledger.entry(job)) for job in jobs_of(root, studies) if rule(job)]
@@ -44,7 +69,13 @@ def run_studies(
     if todo:
         check_writable(root)
         storable = [job for job in todo if failures.can_store(job)]
-        perform(executor, storable, progress, on_compile, failures.add)
+        if storable:
+            progress.begin("physics", len(storable))
+        with closing(executor.map(storable, on_compile)) as ended:  # Ctrl-C ends its processes; what is stored stays
+            for job, cause in ended:
+                if cause is not None:
+                    failures.add(job, cause)
+                progress.advance("physics", job.label)
     among = None if selection is None else {job.path for job in todo}
     measured = sum(executor.measure(ledger, study, progress, on_compile, among) for study in studies)
     ledger.look_again()

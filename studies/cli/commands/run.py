@@ -31,13 +31,12 @@ from studies.store.paths import study_folder
 from studies.store.schema import Status
 from studies.sweep.engines.choose import WORDS, executor_for
 from studies.sweep.executor import Executor
-from studies.sweep.failures import Failures
 from studies.sweep.find_study import ON, find_studies
 from studies.sweep.frame_times import measure_again
 from studies.sweep.job import Job, jobs_of
 from studies.sweep.load import load_runs
 from studies.sweep.plan import TIMING, Planned, plan, plan_again
-from studies.sweep.run_studies import run_studies
+from studies.sweep.run_studies import Failures, run_studies
 from studies.sweep.standings import causes, failed, standings, summary, unexpected, warnings_of
 
 JOBS = 2

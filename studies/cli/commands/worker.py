@@ -10,12 +10,7 @@ import typer
 
 from studies.base.errors import StudyError
 from studies.sweep.engines.choose import NEEDED
-from studies.sweep.engines.tls import words_of
-
-LONELY_SECONDS = 120
-"""Without a scheduler, after which a worker ends."""
-NO_PAGES = ("--no-dashboard", "--dashboard-address", "127.0.0.1:0")
-"""Dask opens the port of its web pages in any case: here, and for this machine alone."""
+from studies.sweep.engines.tls import LONELY_SECONDS, NO_PAGES, words_of
 
 
 def worker(

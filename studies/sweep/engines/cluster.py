@@ -9,10 +9,11 @@ import warnings
 from collections import deque
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager, ExitStack, contextmanager, suppress
+from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
 from queue import SimpleQueue
-from typing import Any
+from typing import Any, cast
 
 from distributed import Client, Future, KilledWorker, wait
 from distributed.client import FutureCancelledError, FuturesCancelledError
@@ -22,7 +23,7 @@ from studies.base.processes import TRIES, Died
 from studies.catalog.study import Study
 from studies.runs.user_code import Given, given_files
 from studies.store.ledger import Ledger
-from studies.sweep.engines.requests import DoJob, FrameTimes, Preparation, check_for, wait_until_seen
+from studies.sweep.engines.requests import check_for, do_job, prepare, time_study, wait_until_seen
 from studies.sweep.engines.worker import JobPlugin, do, machine
 from studies.sweep.executor import CompileListener, Progress
 from studies.sweep.job import Job, case_jobs
@@ -53,12 +54,12 @@ class Session:
 
     def workers(self) -> dict[str, Any]:
         """All workers of the scheduler now, by address. Raises StudyError when it is gone."""
-        if self.client.status != "running":
-            raise StudyError(GONE)
         try:
-            return self.client.scheduler_info()["workers"]
+            if self.client.status == "running":
+                return self.client.scheduler_info(n_workers=-1)["workers"]  # some versions tell of five by default
         except OSError as error:
             raise StudyError(GONE) from error
+        raise StudyError(GONE)
 
     def fit(self) -> dict[str, Any]:
         """Those that get jobs. Warns of those that joined unfit, and raises StudyError when there has been none for
@@ -80,55 +81,33 @@ class Session:
         while not self.workers():
             self.fit()
             time.sleep(LOOK_SECONDS / 5)
-        workers = self.workers()
-        specs: Any = self.client.run(find_spec, "studies")
-        bare = [place for place, spec in specs.items() if spec is None]
+        workers, specs = self.workers(), cast(dict[str, Any], self.client.run(find_spec, "studies"))
+        bare = [workers[place]["name"] for place, spec in specs.items() if spec is None]
         if bare:
-            name = workers[bare[0]]["name"]
-            raise StudyError(f"worker {name} cannot load organbench; install it there; nothing has run")
+            raise StudyError(f"worker {bare[0]} cannot load organbench; install it there; nothing has run")
         try:
             self.client.register_plugin(plugin, name=self.name)
         except StudyError as error:
             raise StudyError(f"{error}; nothing has run") from error
         self.client.subscribe_topic(self.name, lambda event: self.faults.put(event[1]))
 
-    def submit(self, request: Any, **options: Any) -> Future:
-        """Has a request answered by a process of a fit worker."""
+    def submit(self, request: Callable[[], Any], **options: Any) -> Future:
+        """Has a call done by a process of a fit worker, in the order of asking."""
         self.submitted += 1
         options |= {"key": f"{self.name}-{self.submitted}", "priority": -self.submitted, "pure": False}
         return self.client.submit(do, self.name, pickle.dumps(request), resources={self.name: 1}, **options)
 
-    def result(self, future: Future) -> Any:
-        """The answer. Raises StudyError when the scheduler is gone, what the request raised, Died, and KilledWorker."""
-        try:
-            return pickle.loads(future.result())
-        except FutureCancelledError as error:
-            raise StudyError(GONE) from error
-
     def ended(self, futures: Iterable[Future]) -> list[Future]:
-        """Those that have ended; waits a moment for the first. Raises StudyError when the scheduler is gone."""
-        try:
-            with suppress(TimeoutError), self.client.as_current():
-                wait(list(futures), timeout=LOOK_SECONDS, return_when="FIRST_COMPLETED")
-        except FuturesCancelledError as error:
-            raise StudyError(GONE) from error
+        """Those that have ended; waits a moment for the first."""
+        with suppress(TimeoutError), self.client.as_current():
+            wait(list(futures), timeout=LOOK_SECONDS, return_when="FIRST_COMPLETED")
         return [future for future in futures if future.done()]
-
-    def end(self) -> None:
-        """Ends what is being done, and the processes on all workers."""
-        with suppress(Exception):  # the scheduler may be gone
-            self.client.unregister_worker_plugin(self.name)
 
 
 class Cluster:
     """The executor that is a Dask cluster (studies.sweep.executor.Executor)."""
 
-    def __init__(
-        self,
-        scheduler: Callable[[], AbstractContextManager[str]],
-        patience: float,
-        to_come: int = 1,
-    ) -> None:
+    def __init__(self, scheduler: Callable[[], AbstractContextManager[str]], patience: float, to_come: int = 1) -> None:
         """scheduler: makes its address; patience: seconds without any worker that are waited; to_come: jobs that
         workers not yet there will do at a time."""
         self.scheduler, self.patience, self.to_come = scheduler, patience, to_come
@@ -155,30 +134,33 @@ class Cluster:
 
     @contextmanager
     def _session(self, root: Path, files: tuple[Given, ...]) -> Iterator[Session]:
+        """Inside, the workers are prepared. Raises StudyError when the scheduler is gone."""
         session = Session(self._connected(), self.patience)
-        preparation = pickle.dumps(Preparation(os.getcwd(), files))
+        preparation = pickle.dumps(partial(prepare, os.getcwd(), files))
         try:
             with check_for(root, files) as check:
                 session.begin(JobPlugin(session.name, environment(), preparation, pickle.dumps(check)))
                 yield session
+        except (FutureCancelledError, FuturesCancelledError) as error:
+            raise StudyError(GONE) from error
         finally:
-            session.end()
+            with suppress(Exception):  # the scheduler may be gone
+                session.client.unregister_worker_plugin(session.name)  # ends what is being done
 
     def map(self, jobs: Sequence[Job], on_compile: CompileListener) -> Generator[tuple[Job, str | None]]:
         """As every executor; what workers compile is not shown. No more jobs are with Dask than can be done at a time:
         a worker that is lost costs those a try that it had."""
         if not jobs:
             return
+        waiting, running, done = deque(jobs), dict[Future, Job](), list[Path]()
         with self._session(jobs[0].root, files_for(jobs)) as session:
-            waiting, running, done = deque(range(len(jobs))), dict[Future, int](), list[Path]()
             while waiting or running:
                 slots = sum(worker["nthreads"] for worker in session.fit().values())
                 while waiting and len(running) < slots:
-                    number = waiting.popleft()
-                    running[session.submit(DoJob(jobs[number]), retries=TRIES - 1)] = number
+                    job = waiting.popleft()
+                    running[session.submit(partial(do_job, job), retries=TRIES - 1)] = job
                 for future in session.ended(running):
-                    job = jobs[running.pop(future)]
-                    cause = _cause(session, future)
+                    job, cause = running.pop(future), cause_of(future)
                     done += [job.path] if cause is None else []
                     yield job, cause
         wait_until_seen(done)
@@ -189,23 +171,28 @@ class Cluster:
         """As every executor: on one worker of each kind of machine, after all jobs, one machine after the other."""
         root = ledger.root.absolute()
         timed = [job for job in case_jobs(root, study) if job.work.timed]
-        cases, chosen = tuple(job.work for job in timed), [t for t in timed if among is None or t.path in among]
+        chosen = [job for job in timed if among is None or job.path in among]
         ledger.look_again()
         if not chosen or (self.client is None and all(map(ledger.timed_somewhere, chosen))):
             return 0
-        request = FrameTimes(root, study.name, cases, None if among is None else frozenset(among))
+        cases = tuple(job.work for job in timed)
+        # Charts and metrics of a user may not be there to be loaded; the cases are what is timed.
+        request, count = partial(time_study, root, Study(study.name, "", cases, (), ()), among), 0
         with self._session(root, given_files(cases)) as session:
             names = {place: str(worker["name"]) for place, worker in session.fit().items()}
             kinds: Any = session.client.run(machine, session.name, workers=list(names))
             places = {kinds[place]: place for place in sorted(kinds, key=names.__getitem__, reverse=True)}
             progress.begin("timing", len(places))
-            return sum(_timed(session, places[kind], names[places[kind]], request, progress) for kind in sorted(places))
+            for _, place in sorted(places.items()):
+                count += timed_on(session, place, names[place], request, study.name)
+                progress.advance("timing", names[place])
+        return count
 
 
-def _cause(session: Session, future: Future) -> str | None:
+def cause_of(future: Future) -> str | None:
     """Why a job is not done; raises what it raised."""
     try:
-        error = session.result(future)
+        error = pickle.loads(future.result())
     except Died as death:
         return f"its process died {TRIES} times: {death}"
     except KilledWorker as lost:
@@ -215,23 +202,22 @@ def _cause(session: Session, future: Future) -> str | None:
     return None
 
 
-def _timed(session: Session, place: str, name: str, request: FrameTimes, progress: Progress) -> int:
-    """On one worker; how many cases that were."""
+def timed_on(session: Session, place: str, name: str, request: Callable[[], Any], study: str) -> int:
+    """How many cases of a study were timed on one worker."""
     future = session.submit(request, workers=[place])
     while not session.ended([future]):
         if place not in session.fit():
             raise StudyError(f"worker {name} was lost while it measured frame times; the same command goes on")
     try:
-        count, busy = session.result(future)
+        count, busy = pickle.loads(future.result())
     except Died as death:
         raise StudyError(f"worker {name} measured frame times, and its process died: {death}") from death
     if count and busy > BUSY:
         warnings.warn(
-            f"during the frame times of {request.study} other programs used {100 * busy:.0f} % of the processors of "
+            f"during the frame times of {study} other programs used {100 * busy:.0f} % of the processors of "
             f"worker {name}: the times may be too long",
             stacklevel=2,
         )
-    progress.advance("timing", name)
     return count
 
 

@@ -11,7 +11,6 @@ import subprocess
 from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass, fields
-from functools import cache
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -24,7 +23,6 @@ from dask_jobqueue.pbs import PBSCluster
 from dask_jobqueue.sge import SGECluster
 from dask_jobqueue.slurm import SLURMCluster
 from distributed import Scheduler, SpecCluster, Status
-from distributed.deploy.spec import ProcessInterface
 from distributed.utils import get_ip
 from pydantic import ConfigDict, Field, TypeAdapter, ValidationError, with_config
 
@@ -32,12 +30,8 @@ from studies.base.atomic import write_whole
 from studies.base.errors import StudyError
 from studies.base.lookup import lookup
 from studies.base.processes import PATIENCE
-from studies.sweep.engines.tls import KEY, make_key, settings_of, words_of
+from studies.sweep.engines.tls import KEY, LONELY_SECONDS, NO_PAGES, make_key, settings_of, words_of
 
-LONELY_SECONDS = 120
-"""Without a scheduler, after which a worker ends."""
-NO_PAGES = ("--no-dashboard", "--dashboard-address", "127.0.0.1:0")
-"""Dask opens the port of its web pages in any case: here, and for this machine alone."""
 MEMORY_GB = 2.0
 """Of each process by default: a reference of 90,000 unknowns takes 1.4."""
 DISK = "1 GB"
@@ -101,7 +95,7 @@ def read_settings(path: Path) -> Settings:
     for word in given:
         lookup(str(word), fields_by_name, f"setting in {path.name}")
     try:
-        settings = _adapter().validate_python(given)
+        settings = TypeAdapter(Settings).validate_python(given)
     except ValidationError as error:
         first = error.errors()[0]
         where = ".".join(str(part) for part in first["loc"])
@@ -112,11 +106,6 @@ def read_settings(path: Path) -> Settings:
         if settings.kind == "htcondor" and getattr(settings, word):
             raise StudyError(f"{path}: HTCondor has no `{word}`; leave it out, or give a line in `options`")
     return settings
-
-
-@cache
-def _adapter() -> TypeAdapter[Settings]:
-    return TypeAdapter(Settings)
 
 
 @contextmanager
@@ -132,10 +121,11 @@ def scheduler_with_workers(settings: Settings, root: Path, tell: Listener) -> It
         address = cluster.scheduler_address
         write_whole(folder / "scheduler.json", json.dumps({"address": address}).encode())
         try:
-            _start_workers(cluster, settings)
-            what = "workers" if settings.kind == "command" else f"jobs of {settings.kind}"
-            tell(f"{settings.workers} {what} started; what they print is in {folder}")
-            yield address
+            by_program = settings.kind == "command"
+            with programs(settings, folder) if by_program else jobs_of_queue(cluster, settings):
+                what = "workers" if by_program else f"jobs of {settings.kind}"
+                tell(f"{settings.workers} {what} started; what they print is in {folder}")
+                yield address
         finally:
             for gone in (folder / "scheduler.json", folder / KEY):
                 gone.unlink(missing_ok=True)
@@ -152,9 +142,7 @@ def cluster_of(settings: Settings, folder: Path) -> SpecCluster:
     scheduler = {"host": settings.host or get_ip(), "port": 0, "protocol": "tls://"}
     scheduler |= {"dashboard": False, "dashboard_address": "127.0.0.1:0"}
     if settings.kind == "command":
-        worker = {"cls": Command, "options": {"script": _command_lines(settings, folder), "folder": folder}}
-        specification = {"cls": Scheduler, "options": scheduler}
-        return SpecCluster(scheduler=specification, worker=worker)
+        return SpecCluster(scheduler={"cls": Scheduler, "options": scheduler})
     return QUEUES[settings.kind](**_words(settings, folder), scheduler_options=scheduler)
 
 
@@ -189,8 +177,10 @@ def _words(settings: Settings, folder: Path) -> dict[str, Any]:
     return words | ({"queue": settings.queue} if settings.queue else {})
 
 
-def _start_workers(cluster: SpecCluster, settings: Settings) -> None:
-    """Raises StudyError where the queueing system refuses, or is not there."""
+@contextmanager
+def jobs_of_queue(cluster: SpecCluster, settings: Settings) -> Iterator[None]:
+    """Inside, the queue has a job for each worker; closing the cluster ends them. Raises StudyError where the queueing
+    system refuses, or is not there."""
     try:
         for _ in range(settings.workers):
             cluster.worker_spec.update(cluster.new_worker_spec())
@@ -202,38 +192,25 @@ def _start_workers(cluster: SpecCluster, settings: Settings) -> None:
         if isinstance(error, OSError):
             raise StudyError(f"{settings.kind} cannot be used here ({reason}): {here}") from error
         raise StudyError(f"{settings.kind} did not take a job ({reason}): correct the settings") from error
+    yield
 
 
-def _command_lines(settings: Settings, folder: Path) -> str:
-    words = settings.command
+@contextmanager
+def programs(settings: Settings, folder: Path) -> Iterator[None]:
+    """Inside, a shell runs for each worker, in a session of its own: Ctrl-C ends this command, which ends all of it."""
+    script, started = "\n".join([*settings.setup, settings.command]), list[subprocess.Popen[bytes]]()
     file, memory = folder / "scheduler.json", f"{settings.memory_gb or 0:g}"
     for name, value in {"scheduler_file": file, "processes": settings.processes, "memory": memory}.items():
-        words = words.replace(f"{{{name}}}", str(value))  # other braces are the shell's
-    return "\n".join([*settings.setup, words])
-
-
-class Command(ProcessInterface):
-    """A worker that a line of shell starts. It has a session of its own: Ctrl-C ends this command, which ends it."""
-
-    def __init__(self, address: str, name: str, script: str, folder: Path) -> None:
-        super().__init__()
-        self.script, self.log = script, folder / f"worker-{name}.log"
-        self.process: subprocess.Popen[bytes] | None = None
-
-    async def start(self) -> None:
-        """Starts it."""
-        with open(self.log, "wb") as log:
-            words = ["bash", "-c", self.script]
-            self.process = subprocess.Popen(words, stdout=log, stderr=log, start_new_session=True)
-        await super().start()
-
-    async def close(self) -> None:
-        """Ends it, with all that it has started."""
-        process = self.process
-        for number in (signal.SIGTERM, signal.SIGKILL):
-            if process is not None:
-                with suppress(ProcessLookupError):
+        script = script.replace(f"{{{name}}}", str(value))  # other braces are the shell's
+    try:
+        for number in range(settings.workers):
+            with open(folder / f"worker-{number}.log", "wb") as log:
+                words = ["bash", "-c", script]
+                started.append(subprocess.Popen(words, stdout=log, stderr=log, start_new_session=True))
+        yield
+    finally:
+        for process in started:
+            for number in (signal.SIGTERM, signal.SIGKILL):
+                with suppress(ProcessLookupError, subprocess.TimeoutExpired):
                     os.killpg(process.pid, number)
-                with suppress(subprocess.TimeoutExpired):
                     process.wait(PATIENCE)
-        await super().close()

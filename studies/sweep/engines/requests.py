@@ -1,12 +1,12 @@
-"""What a client asks the processes of workers: whether they are fit, and to do jobs."""
+"""What a client has done by the processes of workers: to prove that they are fit, and jobs."""
 
 import os
 import platform
 import secrets
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import psutil
@@ -16,7 +16,6 @@ from studies.base.errors import StudyError
 from studies.base.processes import sendable
 from studies.catalog.study import Study
 from studies.reference.reference_solves import reference_fingerprint
-from studies.runs.case import Case
 from studies.runs.current import run_fingerprint
 from studies.runs.user_code import Given, load_given, read_code
 from studies.store.ledger import Ledger
@@ -32,21 +31,12 @@ WATCHED = 1.0
 """Seconds for which a machine is watched before frame times are measured."""
 
 
-@dataclass(frozen=True)
-class Preparation:
-    """What a process needs before any request."""
-
-    folder: str
-    """In which the client was started."""
-    files: tuple[Given, ...]
-    """Of the user."""
-
-    def prepare(self) -> None:
-        """Goes to that folder where there is one, so that cases find their files, and loads the user's files. Raises
-        StudyError."""
-        if Path(self.folder).is_dir():
-            os.chdir(self.folder)
-        load_given(self.files)
+def prepare(folder: str, files: tuple[Given, ...]) -> None:
+    """Before any request: goes to the folder in which the client was started, where there is one, so that cases find
+    their files, and loads the user's files. Raises StudyError."""
+    if Path(folder).is_dir():
+        os.chdir(folder)
+    load_given(files)
 
 
 def identity(files: tuple[Given, ...] = ()) -> dict[str, str]:
@@ -58,98 +48,67 @@ def identity(files: tuple[Given, ...] = ()) -> dict[str, str]:
     return code | packages | own
 
 
-@dataclass(frozen=True)
-class Check:
-    """Whether a worker is fit."""
+def check(token: Path, content: str, ours: dict[str, str], files: tuple[Given, ...]) -> tuple[str, str]:
+    """Id of the machine, and what is wrong with a worker: the end of a sentence that begins with its name, or "".
 
-    token: Path
-    """A file in the results folder, which the client has just written."""
-    content: str
-    ours: dict[str, str]
-    files: tuple[Given, ...]
-
-    def answer(self) -> tuple[str, str]:
-        """Id of the machine, and what is wrong: the end of a sentence that begins with the worker's name, or "".
-
-        Raises StudyError where nothing can be written to the folder."""
-        return machine_id(), self.fault()
-
-    def fault(self) -> str:
-        """What is wrong here; "" when nothing is."""
-        if not is_there(self.token) or self.token.read_text(encoding="utf-8") != self.content:
-            return f"does not see {self.token.parents[1]}; put the results on a folder that every worker shares"
-        trial = part_path(self.token)
-        write_whole(trial, b"")
-        trial.unlink()
-        for name, theirs in identity(self.files).items():
-            ours = self.ours.get(name)
-            if theirs != ours and name in this_machine().packages | {"Python": None}:
-                return f"has {name} {theirs}, and this machine has {ours}; install the same version there"
-            if theirs != ours:
-                return f"differs in {name}; put the same version there, and start the worker again"
-        return ""
+    token: a file in the results folder, in which the client has just written `content`; ours: its identity. Raises
+    StudyError where nothing can be written to the folder."""
+    if not is_there(token) or token.read_text(encoding="utf-8") != content:
+        return machine_id(), f"does not see {token.parents[1]}; put the results on a folder that every worker shares"
+    trial = part_path(token)
+    write_whole(trial, b"")
+    trial.unlink()
+    for name, theirs in identity(files).items():
+        if theirs != ours.get(name) and name in this_machine().packages | {"Python": None}:
+            other = f"has {name} {theirs}, and this machine has {ours.get(name)}; install the same version there"
+            return machine_id(), other
+        if theirs != ours.get(name):
+            return machine_id(), f"differs in {name}; put the same version there, and start the worker again"
+    return machine_id(), ""
 
 
 @contextmanager
-def check_for(root: Path, files: tuple[Given, ...]) -> Iterator[Check]:
+def check_for(root: Path, files: tuple[Given, ...]) -> Iterator[Callable[[], tuple[str, str]]]:
     """The check of workers that are to write below `root`; its file is gone afterwards. Raises StudyError where it
     cannot be written."""
     content = secrets.token_hex(16)
     token = root / "cache" / f"shared-{content[:8]}"
     write_whole(token, content.encode())
     try:
-        yield Check(token, content, identity(files), files)
+        yield partial(check, token, content, identity(files), files)
     finally:
         token.unlink(missing_ok=True)
 
 
-@dataclass(frozen=True)
-class DoJob:
-    """A job of a sweep."""
-
-    job: Job
-
-    def answer(self) -> Exception | None:
-        """Does it, unless its result is there: a job whose worker was lost may be done. What it raised, which Dask
-        would take for a reason to try again."""
-        try:
-            do(self.job)
-        except MemoryError:
-            raise
-        except Exception as error:
-            return sendable(error)
-        return None
+def do_job(job: Job) -> Exception | None:
+    """Does a job of a sweep, unless its result is there: a job whose worker was lost may be done. What it raised, which
+    Dask would take for a reason to try again."""
+    try:
+        do(job)
+    except MemoryError:
+        raise
+    except Exception as error:
+        return sendable(error)
+    return None
 
 
-@dataclass(frozen=True)
-class FrameTimes:
-    """The frame times of a study on the machine that answers."""
-
-    root: Path
-    study: str
-    cases: tuple[Case, ...]
-    among: frozenset[Path] | None
-
-    def answer(self) -> tuple[int, float]:
-        """How many cases it timed, and the share of the machine's processors that others kept busy just before."""
-        busy = psutil.cpu_percent(WATCHED) / 100
-        study = Study(self.study, "", self.cases, (), ())
-        among = None if self.among is None else set(self.among)
-        return measure_times(Ledger(self.root), study, Silent(), lambda name: None, among), busy
+def time_study(root: Path, study: Study, among: set[Path] | None) -> tuple[int, float]:
+    """Measures the frame times of the cases of a study that this machine has not timed: how many those were, and the
+    share of its processors that others kept busy just before."""
+    busy = psutil.cpu_percent(WATCHED) / 100
+    return measure_times(Ledger(root), study, Silent(), lambda name: None, among), busy
 
 
 def wait_until_seen(paths: Iterable[Path], seconds: float = SIGHT_SECONDS) -> None:
     """Returns when all the files, which other machines have written, are seen here. Raises StudyError when they are
     not in so many seconds."""
     until = time.monotonic() + seconds
-    missing = [path for path in paths if not is_there(path)]
-    while missing:
+    while missing := [path for path in paths if not is_there(path)]:
         if time.monotonic() > until:
             raise StudyError(
                 f"{missing[0]} was written by a worker and is not seen here after {seconds:g} s: the results must lie "
                 "on a folder that every worker shares"
             )
-        time.sleep(min(1.0, seconds / 10))
         for folder in {path.parent for path in missing if path.parent.is_dir()}:
             os.listdir(folder)  # asks the server of a network folder again
-        missing = [path for path in missing if not is_there(path)]
+        time.sleep(min(1.0, seconds / 10))

@@ -1,4 +1,4 @@
-"""A key of one command: who has it reaches the scheduler, and nobody else on the network."""
+"""A key of one command: who has it reaches the scheduler, and nobody else on the network; how workers are called."""
 
 import subprocess
 from pathlib import Path
@@ -10,6 +10,10 @@ CERTIFICATE, KEY = "certificate.pem", "key.pem"
 DAYS = 365
 """Lifetime of a key; the command that owns its folder ends earlier."""
 OPENSSL_SECONDS = 60.0
+LONELY_SECONDS = 120
+"""Without a scheduler, after which a worker ends."""
+NO_PAGES = ("--no-dashboard", "--dashboard-address", "127.0.0.1:0")
+"""Dask opens the port of its web pages in any case: here, and for this machine alone."""
 
 
 def make_key(folder: Path) -> None:

@@ -19,7 +19,7 @@ from studies.base.processes import Child, Died, Message, Tell
 
 
 def do(session: str, request: bytes) -> bytes:
-    """In a Dask job: has a pickled request (studies.sweep.engines.requests) done; its pickled answer. Raises Died.
+    """In a Dask job: has a pickled call (studies.sweep.engines.requests) done; its pickled answer. Raises Died.
 
     All stays pickled here: this process may lack the types."""
     return get_worker().plugins[session].do(request)  # pyright: ignore[reportAttributeAccessIssue]
@@ -35,32 +35,23 @@ class JobPlugin(WorkerPlugin):
     its code, its libraries and its view of the results folder are those of the client; else it gets nothing."""
 
     def __init__(self, session: str, environment: dict[str, str], preparation: bytes, check: bytes) -> None:
-        """preparation, check: pickled, done by each process first, and by one of them before any job."""
+        """preparation, check: pickled calls, done by each process first, and by one of them before any job."""
         self.session, self.environment, self.preparation, self.check = session, environment, preparation, check
         self.machine = ""
 
     async def setup(self, worker: Worker) -> None:
         """Raises StudyError, and sends the client an event, when the worker is not fit."""
-        self.begin()
+        self.lock, self.children = Lock(), list[Child]()
+        multiprocessing.current_process().daemon = False  # Dask's nanny sets it, which forbids processes of its own
         fault = await asyncio.to_thread(self.fault)
         if fault:
-            fault = f"worker {worker.name} {fault}"
-            worker.log_event(self.session, fault)
-            raise StudyError(fault)
+            worker.log_event(self.session, f"worker {worker.name} {fault}")
+            raise StudyError(f"worker {worker.name} {fault}")
         await worker.set_resources(**{self.session: worker.state.nthreads})
 
     async def teardown(self, worker: Worker) -> None:
-        """The client has ended."""
+        """The client has ended: so do the processes, whatever they do."""
         await worker.set_resources(**{self.session: 0})
-        self.end()
-
-    def begin(self) -> None:
-        """Once, in the worker; it starts no process yet."""
-        self.lock, self.children = Lock(), list[Child]()
-        multiprocessing.current_process().daemon = False  # Dask's nanny sets it, which forbids processes of its own
-
-    def end(self) -> None:
-        """Ends the processes, whatever they do."""
         with self.lock:
             for child in self.children:
                 if child.busy:
@@ -97,9 +88,9 @@ class JobPlugin(WorkerPlugin):
 
 def prepare(preparation: bytes, tell: Tell) -> None:
     """In a process: what it does before any request."""
-    pickle.loads(preparation).prepare()
+    pickle.loads(preparation)()
 
 
 def answer(request: bytes) -> Any:
     """In a process: the pickled answer to a request."""
-    return pickle.dumps(pickle.loads(request).answer())
+    return pickle.dumps(pickle.loads(request)())

@@ -10,9 +10,8 @@ from studies.base.errors import StudyError
 from studies.geometry import HalfSpace
 from studies.meshing.scene_mesh import mesh_for, patch_nodes
 from studies.runs.prepare import attachments_for, body_for, prepare
-from studies.runs.recipes import BODIES, MembraneBody, TetrahedralBody
+from studies.runs.recipes import BODIES, TetrahedralBody
 from studies.scene.library.ball_clamped import BALL_CLAMPED
-from studies.scene.library.bladder_fill import BLADDER_FILL
 from studies.scene.scene import Held
 from tests.studies.geometry.boxes import box, split
 from tests.studies.tiny import NODES, SQUEEZE, cube, file_scene, tiny_case, write_obj
@@ -47,13 +46,6 @@ def test_the_masses_add_up_to_density_times_volume(ball_mesh, kind):
     for scene in (CLAMPED, dense):
         body = body_for(scene, BODIES[kind](NODES, stiffness=3.0), ball_mesh)
         assert body.mass.sum() == pytest.approx(scene.tissue.density * ball_mesh.volume, rel=1e-12)
-
-
-def test_a_membrane_weighs_as_much_as_wall_and_content(mesh_cache):
-    """The content has the tissue's density (wall_for): together the density times all that the outer surface holds."""
-    mesh = mesh_for(BLADDER_FILL, 400)
-    body = body_for(BLADDER_FILL, MembraneBody(400, law="delingette"), mesh)
-    assert body.mass.sum() == pytest.approx(BLADDER_FILL.tissue.density * mesh.outer_volume, rel=1e-9)
 
 
 def test_the_laws_differ_and_match_the_tissue(ball_mesh):
@@ -131,8 +123,3 @@ def test_a_dt_above_the_limit_is_refused_unless_the_case_allows_it():
     with pytest.raises(MassSpringError, match="above the stability limit"):
         prepare(tiny_case(dt_fraction=1.5, frames=100))
     assert prepare(case.replaced(beyond_limit=True)).setup.clock.dt > limit
-
-
-def test_an_unknown_shape_gets_the_nearest_match():
-    with pytest.raises(StudyError, match="unknown organ 'livver'; did you mean 'liver'"):
-        mesh_for(replace(SQUEEZE, organ=replace(SQUEEZE.organ, shape="livver")), NODES)

@@ -6,8 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from massspring import ImplicitVolume, LinearModes, MassSpringError, simulate, step_limit
-from studies.base.errors import StudyError
+from massspring import ImplicitVolume, simulate, step_limit
 from studies.meshing.graded_mesh import MIDDLE, halved
 from studies.meshing.scene_mesh import mesh_for
 from studies.meshing.shaping import quadratic_mesh
@@ -16,10 +15,7 @@ from studies.runs.case import Case
 from studies.runs.prepare import Prepared, prepared_on
 from studies.runs.recipes import QuadraticBody, TetrahedralBody
 from studies.runs.run import measure
-from studies.scene.as_json import scene_from_dict, scene_to_dict
-from studies.scene.checks import check_scene
 from studies.scene.clock import MOST_EVENTS, event_frames
-from studies.scene.cut import Cut
 from studies.scene.library import BALL_BISECTED, BALL_INCISED, LIVER_CUT_LIVE, LIVER_INCISED
 from tests.campaigns import campaigns_but
 
@@ -121,46 +117,7 @@ def test_stages_that_open_nothing_make_no_event_and_events_have_frames_of_their_
     assert (np.diff(nodes) > 0).all()
 
 
-@pytest.mark.parametrize(
-    ("options", "sentence"),
-    [
-        ({"until": 2.0}, "has until and no along"),
-        ({"along": (1.0, 0.0, 0.0)}, "has along and no until"),
-        ({"until": 0.5, "along": ALONG}, r"advances from 1 s until 0\.5 s; give a later end"),
-        ({"until": 1.0, "along": ALONG}, r"advances from 1 s until 1 s; give a later end"),
-        ({"until": float("nan"), "along": ALONG}, r"advances from 1 s until nan s; give a later end"),
-        ({"until": 2.0, "along": (0.0, 0.0, 0.0)}, "give a direction of finite numbers, not all 0"),
-        ({"until": 2.0, "along": (0.0, float("inf"), 0.0)}, "give a direction of finite numbers, not all 0"),
-        ({"until": 2.0, "along": (0.0, 0.0, -3.0)}, "advances along the normal of its plane"),
-    ],
-)
-def test_fronts_that_cannot_be_are_refused(options, sentence):
-    with pytest.raises(StudyError, match=sentence):
-        Cut("knife", BALL_INCISED.cut.plane, at=1.0, **options)
-
-
-def test_times_of_a_front_that_no_run_can_have_are_refused():
-    scene = advancing(BALL_INCISED)
-    during = replace(scene, checkpoints=(1.0, 1.5, 4.0))
-    with pytest.raises(StudyError, match=r"a checkpoint at 1\.5 s, and cut 'incision' advances from 1 to 2 s"):
-        check_scene(during)
-    with pytest.raises(StudyError, match=r"within one of 200 frames; ask for more frames"):
-        check_scene(advancing(BALL_INCISED, until=1.001))
-    with pytest.raises(StudyError, match=r"at 5 s is not between two of the 200 frames"):
-        check_scene(advancing(BALL_BISECTED, until=5.0))
-    late = replace(scene, checkpoints=(1.0, 2.005, 4.0))
-    with pytest.raises(StudyError, match=r"the checkpoint at 2\.005 s and cut 'incision' before it at 2 s are in one"):
-        check_scene(late)
-    with pytest.raises(MassSpringError, match="no body that changes in a run: its modes are those of one body"):
-        prepared_on(Case(scene, BODIES["cotangent"], LinearModes()), mesh_of(scene, "one"))
-
-
 def test_the_reference_does_not_depend_on_how_a_cut_advances():
     assert physics(LIVER_CUT_LIVE) == physics(LIVER_INCISED)
     assert published(LIVER_CUT_LIVE) == published(LIVER_INCISED) is not None
     assert physics(replace(LIVER_INCISED, cuts=(replace(LIVER_INCISED.cut, at=2.5),))) != physics(LIVER_INCISED)
-
-
-def test_a_scene_is_read_back_and_scenes_without_a_front_are_stored_as_before():
-    assert scene_from_dict(scene_to_dict(LIVER_CUT_LIVE)) == LIVER_CUT_LIVE
-    assert set(scene_to_dict(LIVER_INCISED)["cuts"][0]) == {"name", "plane", "within", "at", "free"}

@@ -138,11 +138,6 @@ def test_a_shape_to_start_from_is_refused(mesh_cache, tmp_path):
         solve(tmp_path, ReferenceSolve(flat))
 
 
-def test_a_plan_with_an_impossible_time_step_is_refused():
-    with pytest.raises(StudyError, match="dt"):
-        ReferencePlan("octant", (0.5, 0.4), dt=0.0)
-
-
 def test_a_scene_at_rest_has_no_frequency():
     assert not allowed(BALL_SQUEEZE, "frequency")
     assert allowed(SCENE, "frequency")

@@ -6,16 +6,14 @@ import numpy as np
 import pytest
 
 from massspring import ImplicitVolume, Ramp, simulate
-from studies.base.errors import StudyError
-from studies.geometry import BallRegion, organ
+from studies.geometry import organ
 from studies.geometry.mesh.organ_mesh import boundary_triangles, tetrahedron_volumes, triangle_areas, unique_edges
 from studies.meshing.opened_mesh import opened_mesh
 from studies.meshing.scene_mesh import mesh_for
 from studies.runs.case import Case
-from studies.runs.prepare import mesh_of, prepare, prepared_on
-from studies.runs.recipes import MembraneBody, QuadraticBody, SurfaceBody, TetrahedralBody
-from studies.scene.checks import check_scene
-from studies.scene.library import BALL_CLAMPED, SHELL_OPENED
+from studies.runs.prepare import mesh_of, prepared_on
+from studies.runs.recipes import QuadraticBody, TetrahedralBody
+from studies.scene.library import SHELL_OPENED
 from studies.scene.library.ball_cuts import RADIUS, WALL
 from studies.scene.scene import Lumen
 from tests.campaigns import campaigns_but
@@ -103,26 +101,3 @@ def test_both_halves_of_a_wall_keep_their_volumes():
     assert made.body.kept.count == 2
     np.testing.assert_allclose(history.volume[-1], made.body.rest_volumes, rtol=1e-6)
     np.testing.assert_allclose(history.volume.sum(axis=1), made.body.rest_volumes.sum(), rtol=1e-4)
-
-
-def test_what_no_cut_opens_is_refused():
-    disc = BallRegion((0.0, 0.0, 0.0), 0.01)
-    for scene, sentence in (
-        (with_cut(opens_lumen=False), "let what fills it go: opens_lumen=True"),
-        (with_cut(within=disc), "is a disc inside the body, and the organ is hollow"),
-        (with_cut(contact=True), "no cut through a wall has yet; leave out contact"),
-        (
-            replace(BALL_CLAMPED, cuts=(replace(SHELL_OPENED.cut, at=0.5),)),
-            "opens a lumen, and its organ is solid; leave it out",
-        ),
-    ):
-        with pytest.raises(StudyError, match=sentence):
-            check_scene(scene)
-    for body, sentence in (
-        (MembraneBody(nodes=NODES), "which a membrane body cannot do yet"),
-        (SurfaceBody(nodes=NODES), "which a surface body cannot do yet"),
-        (TetrahedralBody(nodes=NODES, cut="virtual"), "virtual nodes do not apply .* whose cut opens a lumen"),
-        (TetrahedralBody(nodes=NODES, volumes="whole"), "keeps wall and content as one volume; keep them apart"),
-    ):
-        with pytest.raises(StudyError, match=sentence):
-            prepare(Case(SHELL_OPENED, body))

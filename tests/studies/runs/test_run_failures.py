@@ -8,12 +8,11 @@ import pytest
 
 from massspring import Capsule, Sphere, Trajectory
 from studies.geometry import HalfSpace
-from studies.meshing.scene_mesh import mesh_for
 from studies.runs.recipes import BODIES, SurfaceBody, TetrahedralBody
-from studies.runs.run import measure, run_case
+from studies.runs.run import measure
 from studies.scene.scene import Held, Organ
-from studies.store.record import Status, read_record
-from tests.studies.tiny import NODES, SQUEEZE, cube, file_scene, tiny_case, why_stale, write_obj
+from studies.store.record import Status
+from tests.studies.tiny import NODES, SQUEEZE, cube, file_scene, tiny_case, write_obj
 
 
 def failure(case) -> str:
@@ -139,16 +138,3 @@ def test_attachments_that_overlap_or_miss_fail_in_one_sentence(tmp_path):
     assert measure(tiny_case(scene=file_scene(path, held=(top,)), body=body)).status == Status.OK
     assert "same node" in failure(tiny_case(scene=file_scene(path, held=(top, replace(top, name="again"))), body=body))
     assert "holds no node" in failure(tiny_case(scene=file_scene(path, held=(far,)), body=body))
-
-
-def test_a_mesh_file_comes_as_it_is(tmp_path):
-    points, triangles = box()
-    mesh = mesh_for(file_scene(write_obj(tmp_path / "box.obj", points, triangles)), 999, filled=False)
-    assert len(mesh.points) == len(points)
-
-
-def test_failures_are_stored_like_successes(tmp_path):
-    case = tiny_case(body=TetrahedralBody(nodes=NODES, stiffness=-1.0))
-    record = read_record(run_case(tmp_path, "tiny", case))
-    assert record.status == Status.FAILED
-    assert why_stale(tmp_path, case) is None

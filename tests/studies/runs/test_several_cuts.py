@@ -8,10 +8,8 @@ import pytest
 
 from massspring import ImplicitVolume, Trajectory, simulate
 from reference_fem import equilibrium_path, nodes
-from studies.base.errors import DoesNotApply, StudyError
-from studies.exchange.meshes import given_scene
 from studies.geometry import HalfSpace, OrganMesh, organ
-from studies.geometry.mesh.organ_mesh import boundary_triangles, signed_volume
+from studies.geometry.mesh.organ_mesh import boundary_triangles
 from studies.meshing.nested_mesh import base_mesh
 from studies.meshing.opened_mesh import opened_elements
 from studies.metrics.metrics import METRICS
@@ -21,13 +19,10 @@ from studies.reference.nested import path_of, problems_of
 from studies.reference.problem import problem_on
 from studies.reference.reference_solves import ReferenceSolve
 from studies.reference.solve import solve
-from studies.report.page.case_data import errors_of
-from studies.report.view.from_records import shown_run
 from studies.runs.case import Case
 from studies.runs.prepare import prepare, prepared_on
-from studies.runs.recipes import QuadraticBody, SurfaceBody, TetrahedralBody
+from studies.runs.recipes import QuadraticBody, TetrahedralBody
 from studies.runs.run import measure
-from studies.scene.checks import check_scene
 from studies.scene.cut import Cut, nearest_cut
 from studies.scene.library.ball_cuts import AWAY, BALL_BISECTED, BALL_CUT_TWICE, CUT_AT, HALF, MIDDLE, RADIUS, SECOND_AT
 from tests.campaigns import campaign
@@ -75,31 +70,6 @@ def test_both_incisions_gape_as_in_the_reference(judged):
         truth = run.gap(run.reference.opening(run.fields.rest[run.cut_pairs[:, 0]]))
         assert widest[0] == pytest.approx(widest[1], rel=alike) and min(widest) > 0.05 * RADIUS
         assert truth[run.cut_of_pairs == 0].max() == pytest.approx(truth[run.cut_of_pairs == 1].max(), rel=0.01)
-
-
-@pytest.mark.campaign
-def test_page_and_view_compare_each_side_of_a_cut_with_its_own_side_of_the_reference(judged):
-    run = judged["quadratic"]
-    behind, front = run.cut_pairs.T
-    step = 1e-4 * RADIUS * np.array(UP)
-    truth = [run.reference.displacements(run.fields.rest[behind] + sign * step)[-1] for sign in (-1, 1)]
-    wide = np.linalg.norm(truth[1] - truth[0], axis=1)
-    assert wide.max() > 0.05 * RADIUS  # taken at the cut itself, one of the sides would be wrong by this
-    moved = run.fields.snapshots[-1] - run.fields.rest
-    wrong = [np.linalg.norm(moved[side] - of, axis=1) for side, of in zip((behind, front), truth, strict=True)]
-    shown = shown_run(run, run.reference, "quadratic")
-    assert shown.error is not None
-    for side, sizes in zip((behind, front), wrong, strict=True):
-        assert np.linalg.norm(shown.error[-1, side], axis=1) == pytest.approx(sizes, abs=1e-3 * RADIUS)
-    assert errors_of(run, run.cut_pairs.ravel())["largest"] < 0.5 * wide.max()
-
-
-@pytest.mark.campaign
-def test_each_pair_belongs_to_the_cut_in_whose_plane_it_lies(judged):
-    for run in judged.values():
-        height = run.fields.rest[run.cut_pairs[:, 0], 2]
-        assert np.array_equal(run.cut_of_pairs, (height > 0).astype(int))
-        assert np.abs(np.abs(height) - AWAY * RADIUS).max() < 1e-12
 
 
 @pytest.mark.campaign
@@ -237,44 +207,3 @@ def test_a_section_and_an_incision_in_a_half(recipe, at, energy):
     gaps = [np.linalg.norm(x[opening.pairs[:, 1]] - x[opening.pairs[:, 0]], axis=1) for x in history.snapshots]
     assert gaps[0][which == late].max() == 0.0 < gaps[1][which == late].max() and gaps[0][which == early].max() > 1e-3
     assert first.body.node_count < second.body.node_count == body.node_count
-
-
-@pytest.mark.campaign
-def test_meshes_of_two_sections_have_three_pieces():
-    cuts = (Cut("low", level(-0.3 * RADIUS), at=1.0), Cut("high", level(0.3 * RADIUS), at=1.0))
-    mesh = organ("ball", 150, {}, cuts=cuts)
-    assert signed_volume(mesh.points, boundary_triangles(mesh.tetrahedra)) == pytest.approx(mesh.volume, rel=1e-13)
-    for cut in cuts:
-        faces = mesh.points[mesh.cuts[cut.name]]
-        assert np.abs(cut.plane.level(faces.reshape(-1, 3))).max() < 1e-15
-        assert (np.cross(faces[:, 1] - faces[:, 0], faces[:, 2] - faces[:, 0])[:, 2] > 0).all()
-    middle = replace(BALL_BISECTED, cuts=cuts)
-    with pytest.raises(StudyError, match="cut 'low' or 'high' leaves a piece that nothing holds"):
-        prepare(Case(middle, TetrahedralBody(nodes=COARSE), ImplicitVolume()))
-    freed = replace(middle, cuts=(cuts[0], replace(cuts[1], free=True)))
-    assert len(np.unique(prepare(Case(freed, TetrahedralBody(nodes=COARSE), ImplicitVolume())).opening.parts)) == 3
-
-
-def test_cuts_that_no_scene_or_body_can_have_are_refused():
-    def with_cuts(*cuts: Cut) -> None:
-        check_scene(replace(AT_ONCE, cuts=cuts))
-
-    with pytest.raises(StudyError, match="the planes of cuts 'below' and 'across' meet inside the body"):
-        with_cuts(BELOW, Cut("across", HalfSpace((0.0, 0.0, 0.0), (0.5, 0.0, 1.0)), HALF, at=1.0))
-    with pytest.raises(StudyError, match="two cuts called 'below'"):
-        with_cuts(BELOW, replace(ABOVE, name="below"))
-    with pytest.raises(StudyError, match="faces of one cut touch and those of another do not"):
-        with_cuts(BELOW, replace(ABOVE, contact=True))
-    with pytest.raises(StudyError, match=r"come within 2\.[56] mm of each other, and the edges"):
-        organ("ball", 200, {}, cuts=(BELOW, replace(ABOVE, plane=level(-AWAY * RADIUS + 2.5e-3))))
-    with pytest.raises(StudyError, match="has its last checkpoint at 4 s and its cut at 4 s"):
-        check_scene(replace(BALL_CUT_TWICE, duration=5.0, cuts=(BELOW, replace(ABOVE, at=4.0))))
-    with pytest.raises(DoesNotApply, match="which has 2 cuts; take cut 'conforming'"):
-        prepare(Case(AT_ONCE, TetrahedralBody(nodes=COARSE, cut="virtual"), ImplicitVolume()))
-    sections = replace(AT_ONCE, cuts=tuple(replace(cut, within=None, free=True) for cut in AT_ONCE.cuts))
-    with pytest.raises(DoesNotApply, match="it has 2 cuts, and this body is cut once"):
-        prepare(Case(sections, SurfaceBody(nodes=COARSE), ImplicitVolume()))
-    with pytest.raises(StudyError, match="it has 2 cuts, and files and words of an export are of one"):
-        given_scene(BALL_CUT_TWICE)
-    with pytest.raises(StudyError, match="has 2 cuts, and one at most is known here"):
-        assert BALL_CUT_TWICE.cut

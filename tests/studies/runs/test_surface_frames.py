@@ -6,10 +6,6 @@ import numpy as np
 import pytest
 
 from massspring import simulate
-from studies.catalog import STUDIES, Study
-from studies.metrics.timing.cases import time_cases
-from studies.report.kept_volume import kept_volumes
-from studies.report.view.stored import stored_runs
 from studies.runs import surface_frames
 from studies.runs.case import Case, case_from_json
 from studies.runs.prepare import prepare
@@ -18,7 +14,6 @@ from studies.runs.run import checkpoint_frames, measure, replay, run_case
 from studies.runs.surface_frames import MOMENTS, moments
 from studies.scene.library import BLADDER_FILL
 from studies.scene.library.stress import STRESS_SCENES
-from studies.store.ledger import Ledger
 from studies.store.record import Status, read_record
 from studies.store.schema import SURFACE
 from tests.studies.tiny import NODES, diverging_case, tiny_case
@@ -74,20 +69,6 @@ def test_it_replays_and_its_case_survives_json(stored):
     assert case_from_json(CASE.key) == CASE
 
 
-def test_timed_runs_keep_no_surface(tmp_path, monkeypatch):
-    """A run that is timed keeps no positions, whatever its case records."""
-    requests = []
-
-    def watched(setup, snapshots=(), **options):
-        requests.append(tuple(snapshots))
-        return simulate(setup, snapshots, **options)
-
-    monkeypatch.setattr("studies.metrics.timing.cases.simulate", watched)
-    monkeypatch.setattr("studies.metrics.timing.cases.BUDGET", 0.0)
-    time_cases(tmp_path, "tiny", [tiny_case(recorded=("surface",), timed=True)], lambda name: None)
-    assert len(requests) >= 2 and set(requests) == {()}
-
-
 def test_an_early_end_is_the_last_frame_and_a_start_of_its_own_the_first():
     cut = measure(diverging_case().replaced(frames=FRAMES, recorded=("surface",)))
     assert cut.status == Status.DIVERGED
@@ -112,21 +93,3 @@ def test_moments_are_few_and_never_before_the_first_frame():
     assert moments(5, [5]) == [1, 2, 3, 4, 5]
     assert len(moments(80_000, [1, 777])) == MOMENTS + 2
     assert moments(1, [1]) == [1] and surface_frames.MOMENTS == 60
-
-
-def test_main_studies_can_be_replayed():
-    """Each main study that judges accuracy has cases to look at, and the results grow by 10 MB at most."""
-    recorded = [case for study in STUDIES if study.main for case in study.cases if case.recorded == ("surface",)]
-    assert {case.scene.name for case in recorded} == {"ball_squeeze", "liver_press", "liver_probe", "ball_clamped"}
-    assert {case.body.kind for case in recorded} == {"tetrahedral", "surface", "quadratic"}
-    assert sum(12 * case.body.nodes * (MOMENTS + 8) for case in recorded) <= 10e6
-
-
-def test_the_same_run_with_and_without_its_surface_is_seen_once(stored, tmp_path):
-    """Two studies may hold it: what lists runs of all studies tells their physics apart, not what is recorded."""
-    kinds = {"one": CASE.replaced(recorded=()), "two": CASE}
-    assert len({run_case(tmp_path, study, case).name for study, case in kinds.items()}) == 2
-    runs, problems = stored_runs(tmp_path)
-    assert problems == [] and len(runs) == 1
-    studies = [Study(study, "Once?", (case,), (), ()) for study, case in kinds.items()]
-    assert len(kept_volumes(Ledger(tmp_path), studies)) == 1

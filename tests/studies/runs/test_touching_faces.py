@@ -5,9 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from massspring import Free, ImplicitVolume, Trajectory, simulate
+from massspring import ImplicitVolume, Trajectory, simulate
 from reference_fem import equilibrium_path
-from studies.base.errors import DoesNotApply
 from studies.meshing.nested_mesh import base_mesh
 from studies.metrics.metrics import METRICS
 from studies.metrics.run import Run
@@ -20,8 +19,7 @@ from studies.runs.case import Case
 from studies.runs.prepare import prepare
 from studies.runs.recipes import QuadraticBody, TetrahedralBody
 from studies.runs.run import measure
-from studies.scene.as_json import scene_from_dict, scene_to_dict
-from studies.scene.library.ball_cuts import BALL_CUT_PRESSED, BALL_INCISED, PUSH, RADIUS
+from studies.scene.library.ball_cuts import BALL_CUT_PRESSED, PUSH, RADIUS
 from tests.campaigns import campaigns_but
 
 pytestmark = pytest.mark.slow
@@ -86,15 +84,3 @@ def test_bodies_next_to_the_reference(tmp_path):
     through = replace(case, scene=replace(scene, cuts=(replace(scene.cuts[0], contact=False),)))
     passed = Run(through, measure(through), reference)
     assert METRIC["overlap"](passed) > 5.0 and METRIC["force_end"](passed) < -30.0
-
-
-def test_a_method_that_cannot_keep_faces_apart_is_refused():
-    with pytest.raises(DoesNotApply, match="whose faces of the cut touch: its steps do not keep the faces of a cut"):
-        prepare(Case(BALL_CUT_PRESSED, BODIES["one"], Free()))
-
-
-def test_contact_is_in_the_key_of_a_scene_only_where_there_is_one():
-    assert "contact" not in scene_to_dict(BALL_INCISED)["cuts"][0]
-    assert scene_to_dict(BALL_CUT_PRESSED)["cuts"][0]["contact"] is True
-    for scene in (BALL_INCISED, BALL_CUT_PRESSED):
-        assert scene_from_dict(scene_to_dict(scene)) == scene

@@ -1,20 +1,16 @@
 """Scenes with a cut that the mesh of the body does not know: the same run, reference and metrics."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
-from massspring import ImplicitVolume, Penalty
-from studies.base.errors import DoesNotApply, StudyError
+from massspring import ImplicitVolume
 from studies.metrics.metrics import METRICS
 from studies.metrics.run import Run
 from studies.reference.load import reference_for
-from studies.runs.case import Case, case_from_json
-from studies.runs.prepare import prepare
+from studies.runs.case import Case
 from studies.runs.recipes import TetrahedralBody
 from studies.runs.run import measure
-from studies.scene.library.ball_cuts import BALL_BISECTED, BALL_CUT_PRESSED, BALL_INCISED
+from studies.scene.library.ball_cuts import BALL_BISECTED, BALL_INCISED
 from studies.store.record import write_record
 
 pytestmark = pytest.mark.slow
@@ -66,23 +62,3 @@ def test_a_section_leaves_pieces_with_their_volumes(body, tmp_path):
     surface, nodes = run.field("surface"), run.field("surface_node")
     np.testing.assert_allclose(surface[-1], last[nodes], atol=1e-7)
     assert run.fields.mass.sum() == pytest.approx(1060.0 * whole, rel=1e-9)
-
-
-def test_what_virtual_nodes_cannot_do_is_refused(tmp_path):
-    whole = replace(BALL_INCISED, cuts=())
-    with pytest.raises(DoesNotApply, match="'ball_incised': it has no cut; leave cut out"):
-        prepare(Case(whole, ONE))
-    with pytest.raises(DoesNotApply, match="whose faces of the cut touch: no node lies on them"):
-        prepare(Case(BALL_CUT_PRESSED, ONE))
-    with pytest.raises(DoesNotApply, match="knows no cells of which a part alone is tissue"):
-        prepare(Case(BALL_INCISED, ONE, Penalty()))
-    with pytest.raises(StudyError, match="a piece that nothing holds"):
-        prepare(Case(replace(BALL_BISECTED, held=BALL_BISECTED.held[:1]), ONE))
-    with pytest.raises(StudyError, match="keeps one volume, or one per node"):
-        prepare(Case(BALL_INCISED, replace(ONE, volumes="patches")))
-
-
-def test_the_way_to_cut_stands_in_the_key():
-    case = Case(BALL_INCISED, ONE)
-    assert case_from_json(case.key) == case
-    assert '"cut": "virtual"' in case.key and case.key != Case(BALL_INCISED, replace(ONE, cut="conforming")).key

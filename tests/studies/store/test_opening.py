@@ -12,6 +12,8 @@ from studies.store.record import SCHEMA, Field, peek, read_record, write_record
 from tests.studies import made_up_run
 from tests.studies.store.test_record import record
 
+MEGABYTE = 1 << 20
+
 
 def change(path, by, seal=True):
     """Through the library, which leaves valid HDF5; seal: with the seal that others can make too."""
@@ -46,8 +48,8 @@ def test_a_changed_byte_is_found_wherever_it_is_in_a_large_file(tmp_path):
     path = tmp_path / "a.h5"
     write_record(path, record(fields={"t": Field(np.ones(400_000), "s", "time of each frame")}))
     whole = path.read_bytes()
-    assert len(whole) > 3 * opening.CHUNK and peek(path).name == record().name
-    for place in range(opening.CHUNK // 2, len(whole), opening.CHUNK):
+    assert len(whole) > 3 * MEGABYTE and peek(path).name == record().name
+    for place in range(MEGABYTE // 2, len(whole), MEGABYTE):
         path.write_bytes(whole[:place] + bytes([whole[place] ^ 1]) + whole[place + 1 :])
         with pytest.raises(DamagedFile):
             peek(path)

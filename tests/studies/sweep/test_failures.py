@@ -18,10 +18,10 @@ from studies.runs.current import case_path
 from studies.scene.library import BALL_CLAMPED
 from studies.store.ledger import Ledger
 from studies.store.record import Status, peek, read_record, write_record
-from studies.sweep.failures import Failures
 from studies.sweep.job import ReferenceJob, do, jobs_of
 from studies.sweep.load import load_runs
 from studies.sweep.local import environment
+from studies.sweep.run_studies import Failures
 from studies.sweep.standings import failed, standings
 from tests.studies.octant import SCENE
 from tests.studies.tiny import tiny_case, tiny_study

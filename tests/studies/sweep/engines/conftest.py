@@ -25,15 +25,15 @@ def scheduler():
         yield cluster.scheduler_address
 
 
-def engine_at(address, patience=20.0, **settings):
+def engine_at(address, patience=20.0):
     """The engine of a cluster that is there."""
-    return Cluster(lambda: nullcontext(address), patience, **settings)
+    return Cluster(lambda: nullcontext(address), patience)
 
 
-def swept(root, study, address, **settings):
+def swept(root, study, address, patience=20.0, **settings):
     """Runs a study there: number of pieces, and the progress of them."""
     progress = Silent()
-    with engine_at(address) as engine:
+    with engine_at(address, patience) as engine:
         return run_studies(root, [study], engine, progress, **settings), progress
 
 

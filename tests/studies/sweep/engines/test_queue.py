@@ -1,9 +1,8 @@
-"""The words after `--on`, the file of a cluster, and its workers: of a queue, here a made-up one, or of a program."""
+"""The file of a cluster, and its workers: of a queue, here a made-up one, or of a program."""
 
 import os
 import re
 import shutil
-import sys
 import time
 from pathlib import Path
 
@@ -11,8 +10,6 @@ import pytest
 from dask import config
 
 from studies.base.errors import StudyError
-from studies.sweep.engines.choose import executor_for
-from studies.sweep.engines.cluster import Cluster
 from studies.sweep.engines.queue import (
     QUEUES,
     Settings,
@@ -22,7 +19,6 @@ from studies.sweep.engines.queue import (
     scheduler_with_workers,
 )
 from studies.sweep.engines.tls import make_key
-from studies.sweep.local import Local
 
 ROOT = Path(__file__).parents[4]
 ONE = "from tests.studies.tiny import tiny_case, tiny_study\nSTUDY = tiny_study(cases=(tiny_case(),))\n"
@@ -136,74 +132,26 @@ def test_the_examples_of_the_docs_are_read(tmp_path):
     assert [settings.kind for settings in read] == ["slurm", "command"]
 
 
-FULL = """
-kind: slurm
-workers: 8
-processes: 16
-hours: 2.5
-memory_gb: 32
-queue: short
-options: ["--account=surgery"]
-setup: ["module load python"]
-"""
+REFUSED = {
+    "unknown setting in jobs.yaml 'proceses'; did you mean 'processes'": "kind: slurm\nworkers: 2\nproceses: 3",
+    "kind: input should be 'slurm', ": "kind: lfs\nworkers: 2",
+    "HTCondor has no `hours`; leave it out": "kind: htcondor\nworkers: 2\nhours: 2",
+    "workers: field required": "kind: pbs",
+    "workers: input should be greater than or equal to 1": "kind: pbs\nworkers: 0",
+    "hours: input should be a valid number, ": "kind: pbs\nworkers: 2\nhours: 2:00:00",
+    "a `command` is given for `kind: command`, and for no other kind": "kind: command\nworkers: 2",
+    "a `command` is given for": "kind: slurm\nworkers: 2\ncommand: ls",
+    "holds no settings; write lines such as `kind: slurm`": "- slurm",
+    "cannot be read as YAML": "kind: [slurm",
+}
 
 
-def chosen(on, jobs=2):
-    return executor_for(on, jobs, Path("results"), print)
-
-
-def test_words_say_where_jobs_run(tmp_path):
-    file = tmp_path / "slurm.yaml"
-    file.write_text(FULL)
-    assert [chosen(""), chosen("local", 3), chosen("local:4")] == [Local(2), Local(3), Local(4)]
-    there, array = chosen("tcp://127.0.0.1:8786"), chosen(str(file))
-    assert isinstance(there, Cluster)
-    assert isinstance(array, Cluster) and array.to_come == 8 * 16
-
-
-@pytest.mark.parametrize(
-    ("on", "message"),
-    [
-        ("local:none", r"give the number of processes, as local:4"),
-        ("local:0", "give the number of processes"),
-        ("slurm", r"--on 'slurm' is not known; give local:N, an address as tcp://HOST:8786, or a FILE\.yaml"),
-        ("nowhere.yaml", r"there is no file nowhere\.yaml; docs/cluster\.md shows how to write one"),
-    ],
-)
-def test_other_words_are_refused(on, message):
-    with pytest.raises(StudyError, match=message):
-        chosen(on)
-
-
-def test_a_missing_package_is_named(monkeypatch):
-    monkeypatch.setitem(sys.modules, "distributed", None)
-    for name in ("cluster", "queue", "worker"):
-        monkeypatch.delitem(sys.modules, f"studies.sweep.engines.{name}", raising=False)
-    with pytest.raises(StudyError, match=r"needs the extra `cluster`, which is not installed: pip install"):
-        chosen("tcp://127.0.0.1:8786")
-
-
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("kind: slurm\nworkers: 2\nproceses: 3", r"unknown setting in jobs\.yaml 'proceses'; did you mean 'processes'"),
-        ("kind: lfs\nworkers: 2", r"kind: input should be 'slurm', .* or 'command'"),
-        ("kind: htcondor\nworkers: 2\nhours: 2", r"HTCondor has no `hours`; leave it out"),
-        ("kind: pbs", r"workers: field required"),
-        ("kind: pbs\nworkers: 0", r"workers: input should be greater than or equal to 1"),
-        ("kind: pbs\nworkers: 2\nhours: 2:00:00", r"hours: input should be a valid number, .*; correct it"),
-        ("kind: command\nworkers: 2", r"a `command` is given for `kind: command`, and for no other kind"),
-        ("kind: slurm\nworkers: 2\ncommand: ls", r"a `command` is given for"),
-        ("- slurm", r"holds no settings; write lines such as `kind: slurm`"),
-        ("kind: [slurm", r"cannot be read as YAML"),
-    ],
-)
-def test_a_file_that_says_something_else_is_refused(tmp_path, text, message):
-    file = tmp_path / "jobs.yaml"
-    file.write_text(text)
-    with pytest.raises(StudyError, match=message) as stop:
-        read_settings(file)
-    assert "\n" not in str(stop.value)
+@pytest.mark.parametrize("words", REFUSED)
+def test_a_file_that_says_something_else_is_refused(tmp_path, words):
+    (tmp_path / "jobs.yaml").write_text(REFUSED[words])
+    with pytest.raises(StudyError) as stop:
+        read_settings(tmp_path / "jobs.yaml")
+    assert words in str(stop.value) and "\n" not in str(stop.value)
 
 
 def script(folder, **changes):

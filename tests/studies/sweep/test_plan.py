@@ -1,17 +1,13 @@
 """What a sweep would run is what it runs; how long it takes is read off what ran before; compiling is reported."""
 
-import io
 import re
 from dataclasses import replace
 from functools import partial
 
 import numba
 import pytest
-from rich.console import Console
 
-from studies.base.compile_watch import watching
 from studies.base.processes import run_each
-from studies.cli.progress import QUIET_SECONDS, TerminalProgress, words
 from studies.metrics.timing.cases import timing_file
 from studies.runs.current import case_path
 from studies.store.entry import CODE_CHANGED, MISSING
@@ -74,11 +70,6 @@ def test_the_estimate_shares_the_physics_and_not_the_timing():
     assert expected([replace(piece(PHYSICS, "case", 2.0), guess=3.0)], 1) == pytest.approx(2.0), "measured counts first"
 
 
-@pytest.mark.parametrize(("seconds", "text"), [(0.2, "1 s"), (80, "80 s"), (200, "3 min"), (6000, "1 h 40 min")])
-def test_times_in_words(seconds, text):
-    assert words(seconds) == text
-
-
 def test_a_dry_run_says_it_all_and_runs_nothing(organbench, tiny_file, results, tmp_path):
     code, out, err = organbench("run", tiny_file, "--dry-run", "--results", tmp_path / "empty")
     assert (code, err) == (0, "")
@@ -92,54 +83,6 @@ def test_a_dry_run_says_it_all_and_runs_nothing(organbench, tiny_file, results, 
     assert "with 2 processes, from earlier runs of 1 case; compiling comes on top" in out
     code, out, _ = organbench("run", tiny_file, "--dry-run", "--only", "failed", "--results", results)
     assert out.strip() == "tiny: nothing would run: all results are current"
-
-
-def log() -> Console:
-    return Console(file=io.StringIO(), width=80)
-
-
-def lines(console) -> list[str]:
-    return console.file.getvalue().splitlines()
-
-
-def test_the_time_left_shrinks_with_every_piece():
-    planned = [Planned(PHYSICS, "case", name, "missing", 60.0) for name in "abcd"]
-    with TerminalProgress(log(), planned, jobs=2) as progress:
-        progress.begin(PHYSICS, 4)
-        assert progress.left() == "about 2 min left"
-        for name in "abc":
-            progress.advance(PHYSICS, name)
-        assert progress.left() == "about 60 s left"
-        progress.advance(PHYSICS, "d")
-    assert lines(progress.console) == ["physics 4/4: d"]
-
-
-def test_a_log_has_one_line_on_compiling_and_then_rests():
-    console = log()
-    with TerminalProgress(console) as progress:
-        for name in ("free_frame", "free_frame", "other"):
-            progress.compiling(name)
-    assert lines(console) == ["compiling free_frame (kept for the next time)"]
-    assert QUIET_SECONDS > 1
-
-
-def test_numba_reports_each_compiled_function_once():
-    @numba.njit
-    def inner(x):
-        return x + 1
-
-    @numba.njit
-    def outer(x):
-        return inner(x) * 2
-
-    functions = []
-    with watching(functions.append) as watch:
-        assert outer(1) == 4
-        assert outer(2) == 6
-    assert functions == ["outer"] and len(watch.compiled) == 2
-    assert watch.seconds > 0
-    outer(1.0)
-    assert functions == ["outer"]
 
 
 def compile_something(task):

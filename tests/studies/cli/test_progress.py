@@ -1,0 +1,43 @@
+"""Progress on the terminal."""
+
+import io
+
+import pytest
+from rich.console import Console
+
+from studies.cli.progress import QUIET_SECONDS, TerminalProgress, words
+from studies.sweep.plan import PHYSICS, Planned
+
+
+@pytest.mark.parametrize(("seconds", "text"), [(0.2, "1 s"), (80, "80 s"), (200, "3 min"), (6000, "1 h 40 min")])
+def test_times_in_words(seconds, text):
+    assert words(seconds) == text
+
+
+def log() -> Console:
+    return Console(file=io.StringIO(), width=80)
+
+
+def lines(console) -> list[str]:
+    return console.file.getvalue().splitlines()
+
+
+def test_the_time_left_shrinks_with_every_piece():
+    planned = [Planned(PHYSICS, "case", name, "missing", 60.0) for name in "abcd"]
+    with TerminalProgress(log(), planned, jobs=2) as progress:
+        progress.begin(PHYSICS, 4)
+        assert progress.left() == "about 2 min left"
+        for name in "abc":
+            progress.advance(PHYSICS, name)
+        assert progress.left() == "about 60 s left"
+        progress.advance(PHYSICS, "d")
+    assert lines(progress.console) == ["physics 4/4: d"]
+
+
+def test_a_log_has_one_line_on_compiling_and_then_rests():
+    console = log()
+    with TerminalProgress(console) as progress:
+        for name in ("free_frame", "free_frame", "other"):
+            progress.compiling(name)
+    assert lines(console) == ["compiling free_frame (kept for the next time)"]
+    assert QUIET_SECONDS > 1
