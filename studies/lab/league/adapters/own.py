@@ -3,7 +3,7 @@
 import time
 from dataclasses import replace
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from scene_folder import SceneFolder, hand_in
@@ -31,7 +31,7 @@ def run(
     own_scene = replace(own_scene, checkpoints=tuple(float(t) for t in scene.times[1:]))
     kind = {one.name: one for one in METHODS}[method](**settings)
     body = QuadraticBody if scene.mesh == "curved" else TetrahedralBody
-    chosen = {} if mass == "lumped" else {"mass": mass}
+    chosen: dict[str, Any] = {} if mass == "lumped" else {"mass": mass}
     if kind.capabilities.keeps == "elements":
         chosen |= {"law": "cotangent", "volumes": "nodal"}  # springs without length, one volume per node
     recipe = body(int(scene.data["meshes"][scene.mesh]["outer_nodes"]), **chosen)
