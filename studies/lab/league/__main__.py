@@ -24,7 +24,6 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m studies.lab.league", description=__doc__)
     parser.add_argument("--results", type=Path, default=Path("results"))
     parser.add_argument("--only", choices=[program.name for program in (*PROGRAMS, *OURS)], help="one program")
-    parser.add_argument("--scene", choices=[name for name, one in frozen().items() if not one.held_back])
     parser.add_argument("--limit", type=float, default=TIME_LIMIT, help="seconds after which a run is ended")
     parser.add_argument("--nodes", type=int, default=NODES, help="vertices on the outer surface")
     parser.add_argument("--sweep", action="store_true", help="search the settings of each on two scenes")
@@ -32,7 +31,7 @@ def main() -> None:
     parser.add_argument("--environments", type=Path, help="folder of the programs' environments")
     asked = parser.parse_args()
     programs = [one for one in (*PROGRAMS, *OURS) if asked.only in (None, one.name)]
-    scenes = [one for one in SCENES if one.name in frozen() and asked.scene in (None, one.name)]
+    scenes = [one for one in SCENES if one.name in frozen()]
     with tempfile.TemporaryDirectory() as folder:
         at = Surroundings(Path(folder), asked.environments or asked.results / "cache" / "environments", asked.limit)
         if asked.sweep:
