@@ -11,8 +11,7 @@ from rich.markup import escape
 
 from studies.base.errors import StudyError
 from studies.cli.terminal import busy, visible, warn
-from studies.geometry.files.estimate import size_warning
-from studies.geometry.files.faults import check_promises
+from studies.geometry.files.faults import check_promises, size_warning
 from studies.geometry.files.opening import opened
 from studies.geometry.files.units import UNITS, Source, check_unit, length_of, likely_units, unit_question
 

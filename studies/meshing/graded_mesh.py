@@ -81,7 +81,6 @@ def halved(
 
 
 def is_hollow(scene: Scene) -> bool:
-    """Whether the scene's organ has a wall."""
     if scene.organ.shape == "file":
         return "wall" in scene.organ.parameters
     shape = true_shape(scene.organ)
@@ -129,7 +128,6 @@ def coarse_level(
 
 
 def check_number(scene: Scene, nodes: object, quadratic: bool) -> None:
-    """Raises StudyError for an impossible number of surface nodes."""
     most = 4 * MOST - 6 if quadratic else MOST
     if isinstance(nodes, bool) or not isinstance(nodes, int | np.integer) or not FEWEST <= nodes <= most:
         raise StudyError(
@@ -138,12 +136,10 @@ def check_number(scene: Scene, nodes: object, quadratic: bool) -> None:
 
 
 def _best(counts: dict[int, int], nodes: int) -> int:
-    """The level whose number of nodes comes nearest."""
     return min(counts, key=lambda tried: abs(counts[tried] - nodes))
 
 
 def _off(counts: dict[int, int], nodes: int) -> float:
-    """Smallest deviation found from the wanted number, over that number."""
     return abs(counts[_best(counts, nodes)] / nodes - 1.0)
 
 

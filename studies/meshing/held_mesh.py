@@ -10,7 +10,7 @@ from skfem import MeshTet, MeshTet2
 from massspring import Obstacle
 from reference_fem import facet_nodes
 from studies.geometry import OrganMesh
-from studies.geometry.mesh.organ_mesh import boundary_triangles, triangle_normals, unique_edges
+from studies.geometry.mesh.organ_mesh import boundary_triangles, counted_edges, triangle_normals, unique_edges
 from studies.geometry.surface.distance import distance_to_surface
 from studies.meshing.scene_mesh import patch_nodes
 from studies.scene.scene import Scene
@@ -58,7 +58,6 @@ class HeldMesh:
 
     @property
     def cut_faces(self) -> np.ndarray:
-        """The faces of all cuts together, (f, 3)."""
         return np.concatenate([np.empty((0, 3), np.int64), *self.faces_of_cuts])
 
     @cached_property
@@ -68,9 +67,7 @@ class HeldMesh:
 
     def rim(self, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Sides of the front and of the trace in the outer surface of `faces` (f, 3) of cuts, (s, 2) and (t, 2)."""
-        sides = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-        sides, count = np.unique(sides, axis=0, return_counts=True)
-        sides, count = sides.reshape(-1, 2), np.asarray(count)
+        sides, count = counted_edges(faces)
         outer = unique_edges(boundary_triangles(self.mesh.t.T.astype(np.int64)))
         key = np.array([self.mesh.nvertices, 1])
         rim = sides[count == 1]
@@ -137,7 +134,6 @@ def held_mesh(scene: Scene, organ_mesh: OrganMesh) -> HeldMesh:
 
 
 def straight(organ_mesh: OrganMesh) -> MeshTet:
-    """The tetrahedra as a scikit-fem mesh."""
     return MeshTet(np.ascontiguousarray(organ_mesh.points.T), np.ascontiguousarray(organ_mesh.tetrahedra.T))
 
 

@@ -50,8 +50,6 @@ GROWTH = 1.3
 
 @dataclass(frozen=True, eq=False)
 class NestedMesh:
-    """One mesh of a family."""
-
     scene: Scene
     body: HeldMesh
     """The mesh before its vertices were moved to the true shape: its elements are parts of the flat elements of the

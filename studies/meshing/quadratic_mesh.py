@@ -40,7 +40,6 @@ class QuadraticMesh:
 
     @property
     def hollow(self) -> bool:
-        """Whether there is a lumen."""
         return len(self.lumen) > 0
 
     @property

@@ -5,14 +5,12 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import KDTree
 from skfem.quadrature import get_quadrature
 from skfem.refdom import RefTri
 
 from massspring.body.quadratic import PARTS_OF_FACET
-from studies.geometry.mesh.organ_mesh import triangle_areas
+from studies.geometry.mesh.organ_mesh import connected, triangle_areas
 from studies.geometry.surface.distance import distance_to_surface
 from studies.geometry.surface.sides import along_facets, lattice, shape_functions
 
@@ -52,7 +50,6 @@ class RestSurface:
 
     @property
     def curved(self) -> bool:
-        """Whether its facets have six nodes."""
         return self.facets.shape[1] == 6
 
     def lattice(self, divisions: int = DIVISIONS) -> tuple[np.ndarray, np.ndarray]:
@@ -98,8 +95,7 @@ def rest_surfaces(points: np.ndarray, facets: np.ndarray) -> dict[str, RestSurfa
     """The boundary `facets` (f, 3 or 6) on points (n, 3) [m] as an outer surface and, in a hollow body, a lumen: the
     connected parts that enclose a positive and a negative volume."""
     ends = facets[:, [[0, 1], [1, 2]]].reshape(-1, 2).astype(np.int64)
-    graph = coo_array((np.ones(len(ends)), tuple(ends.T)), shape=(len(points), len(points)))
-    label = connected_components(graph, directed=False)[1][facets[:, 0]]
+    label = connected(ends, len(points))[facets[:, 0]]
     parts = [facets[label == number] for number in np.unique(label)]
     inside = [RestSurface(points, part).volume < 0.0 for part in parts]
     sides = {OUTER: [part for part, lumen in zip(parts, inside, strict=True) if not lumen]}

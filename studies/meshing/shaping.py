@@ -10,7 +10,7 @@ from reference_fem import facet_nodes, nodes
 from reference_fem.elements.shapes import edge_index
 from studies.base.errors import StudyError
 from studies.geometry import OrganMesh, curved
-from studies.geometry.mesh.organ_mesh import tetrahedron_volumes
+from studies.geometry.mesh.organ_mesh import tetrahedron_volumes, turn_inverted
 from studies.geometry.mesh.quality import PAIRS, tetrahedron_radius_ratio
 from studies.geometry.shape.levelset import Shape, at_depth, project
 from studies.meshing.held_mesh import HeldMesh, rim_sides
@@ -218,15 +218,12 @@ def named_patches(scene: Scene, name: str, held: list[np.ndarray], new: np.ndarr
 
 
 def named_cuts(scene: Scene, body: HeldMesh, new: np.ndarray) -> dict[str, np.ndarray]:
-    """The faces of the scene's cuts, in their new numbers."""
     return {cut.name: new[faces] for cut, faces in zip(scene.cuts, body.faces_of_cuts, strict=True)}
 
 
 def upright_cells(body: HeldMesh) -> np.ndarray:
     """Elements (k, 10) of positive volume in VTK's order; numbers as `reference_fem.nodes` has them."""
     mesh = body.mesh
-    corners = mesh.t.T.astype(np.int64)
-    turned = tetrahedron_volumes(mesh.p.T, corners) < 0
-    corners[turned] = corners[turned][:, [0, 2, 1, 3]]
+    corners = turn_inverted(mesh.p.T, mesh.t.T.astype(np.int64))
     middles = edge_index(mesh, corners[:, np.array(PAIRS)].reshape(-1, 2)).reshape(-1, 6)
     return np.concatenate([corners, mesh.nvertices + middles], axis=1)

@@ -9,6 +9,7 @@ from reference_fem import Evaluator, nodes
 from reference_fem.elements.shapes import edge_index
 from studies.base.lookup import lookup
 from studies.geometry import CurvedMesh, true_shape_of
+from studies.geometry.mesh.organ_mesh import unique_edges
 from studies.geometry.mesh.quality import PAIRS
 from studies.geometry.organs import SHAPES
 from studies.geometry.shape.levelset import Shape, at_depth, project
@@ -62,12 +63,11 @@ def in_cut_planes(points: np.ndarray, body: HeldMesh, shape: Shape, cuts: tuple[
     mesh, points = MeshTet2.from_mesh(body.mesh), points.copy()
     lumen = body.facets(mesh)[-1][:, :3]
     for cut, faces in zip(cuts, body.faces_of_cuts, strict=True):
-        sides = np.unique(np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1), axis=0).reshape(-1, 2)
         _, rim = body.rim(faces)
         inner = np.isin(rim, lumen).all(axis=1)
         flat, outside, inside = (
             np.concatenate([np.unique(vertices), mesh.nvertices + edge_index(mesh, ends)])
-            for vertices, ends in ((faces, sides), (rim[~inner],) * 2, (rim[inner],) * 2)
+            for vertices, ends in ((faces, unique_edges(faces)), (rim[~inner],) * 2, (rim[inner],) * 2)
         )
         points[flat] -= np.outer(cut.plane.level(points[flat]), cut.unit_normal)
         for trace, surface in ((outside, shape), (inside, at_depth(shape, shape.wall or 0.0))):

@@ -11,7 +11,7 @@ from massspring.body.virtual_nodes import VirtualNodes, virtual_nodes
 from studies.base.errors import StudyError
 from studies.geometry import OrganMesh
 from studies.geometry.mesh.clipped import covered_part, crossing_edges, crossings, divided
-from studies.geometry.mesh.organ_mesh import surface_first, unique_edges
+from studies.geometry.mesh.organ_mesh import mean_edge, surface_first
 from studies.scene.cut import Cut
 
 NEAR = 1e-4
@@ -59,8 +59,7 @@ def virtual_mesh(mesh: OrganMesh, cut: Cut) -> VirtualMesh:
     not possible."""
     cells, points = mesh.tetrahedra.astype(np.int64), mesh.points
     level, normal = cut.plane.level(points), np.asarray(cut.plane.normal, float) / np.linalg.norm(cut.plane.normal)
-    edges = unique_edges(mesh.triangles)
-    least = NEAR * float(np.linalg.norm(points[edges[:, 0]] - points[edges[:, 1]], axis=1).mean())
+    least = NEAR * mean_edge(points, mesh.triangles)
     level = np.where(np.abs(level) < least, np.where(level < 0, -least, least), level)
 
     def covers(places: np.ndarray) -> np.ndarray:

@@ -18,8 +18,7 @@ from reference_fem import (
     nodes,
 )
 from studies.base.errors import StudyError
-from studies.geometry.mesh.organ_mesh import tetrahedron_facets
-from studies.geometry.mesh.wall_layers import mean_edge
+from studies.geometry.mesh.organ_mesh import mean_edge, tetrahedron_facets
 from studies.reference.fields import fields_of
 from studies.reference.nested import FamilySolution, solve_nested
 from studies.reference.problem import reference_problem

@@ -86,17 +86,15 @@ def examined(source: Source, how: dict[str, Any]) -> Findings | None:
 
 
 def options(how: dict[str, Any]) -> str:
-    """These arguments as options of the mesh command, such as "--nodes 550 --smooth 3"."""
+    """These arguments as options of the mesh command."""
     given = [f"--{key} {1e3 * how[key]:g}" for key in ("smooth", "solid") if key in how]
     return " ".join([f"--nodes {NODES}", *given, *(["--close-holes"] if "holes" in how else [])])
 
 
 def command(source: Source, how: dict[str, Any]) -> str:
-    """The whole mesh command for a file with these arguments."""
     words = ["organbench", "mesh", "--from", str(source.path)]
     side = None if source.longest_side is None else f"{source.longest_side:g}m"
-    given = {"--unit": source.unit, "--scale": None if source.scale == 1.0 else f"{source.scale:g}"}
-    given |= {"--longest-side": side, "--part": source.part}
-    for option, value in given.items():
-        words += [] if value is None else [option, value]
+    scale = None if source.scale == 1.0 else f"{source.scale:g}"
+    given = {"--unit": source.unit, "--scale": scale, "--longest-side": side, "--part": source.part}
+    words += [word for pair in given.items() if pair[1] is not None for word in pair]
     return shlex.join([*words, *options(how).split(), "-o", f"{stem_of(source.path)}_body.vtu"])

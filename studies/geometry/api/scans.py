@@ -57,22 +57,7 @@ class Remeshing:
     """Whether nodes lie on the true shape (true_shape_of), for sides that are curved onto it later; else the flat sides
     enclose the volume."""
 
-    def check(self, name: str) -> None:
-        """Raise StudyError unless `smooth` and `solid` are finite and >= 0 and `wall` is finite and above 0.
-
-        name: of the file.
-        """
-        if not 0 <= self.smooth < np.inf:
-            raise StudyError(f"{name}: smoothing over {1e3 * self.smooth:g} mm asked for; give 0 or a few millimetres")
-        if self.solid is not None and not 0 <= self.solid < np.inf:
-            millimetres = 1e3 * self.solid
-            raise StudyError(f"{name}: cannot close openings of {millimetres:g} mm; give 0 or a few millimetres")
-        if self.wall is not None and not 0 < self.wall < np.inf:
-            raise StudyError(f"{name}: a wall of {1e3 * self.wall:g} mm asked for; give a thickness above 0")
-
     def check_count(self, nodes: int | None, name: str) -> None:
-        """Raise StudyError unless `nodes` is a whole number, or None without smooth, wall and solid; name: of the
-        file."""
         if nodes is None and (self.smooth or self.wall is not None or self.solid is not None):
             raise StudyError(
                 f"{name}: smoothing, a wall and a filled shell need a new surface; set its number of nodes (--nodes)"
@@ -83,11 +68,12 @@ class Remeshing:
     @property
     def recipe(self) -> dict[str, Any]:
         """The fields that change a remeshed body, except `holes`; JSON-able."""
-        thickness = {} if self.wall is None else {"wall": float(self.wall)}
-        count = {} if self.wall is None or self.layers is None else {"layers": int(self.layers)}
-        on = {"on_shape": True} if self.on_shape else {}
-        filled = {} if self.solid is None else {"solid": float(self.solid)}
-        return {"smooth": float(self.smooth)} | filled | thickness | count | on
+        given: dict[str, Any] = {"smooth": float(self.smooth)}
+        if self.solid is not None:
+            given["solid"] = float(self.solid)
+        if self.wall is not None:
+            given |= {"wall": float(self.wall)} | ({} if self.layers is None else {"layers": int(self.layers)})
+        return given | ({"on_shape": True} if self.on_shape else {})
 
 
 def scan(
@@ -114,13 +100,16 @@ def scan(
     surface, recipe = repaired_surface(source, content, remeshing)
     remeshing.check_count(nodes, name)
     if nodes is None:
-        body = as_it_is(surface, recipe, fill)
+        check_surface(surface.points, surface.triangles, name)
+        check_one_part(surface.triangles, name)
+        check_amount(signed_volume(surface.points, surface.triangles), name)
+        none = np.empty((0, 4), np.int64)
+        body = OrganMesh(recipe["name"], surface.points, surface.triangles, none, len(surface.points), {}, recipe)
+        body = fill_mesh(body) if fill else body
         if regions is None:
             return with_patches(body, content, source.metres(content.longest_side, content.unit))
         return attach(body, regions) if regions else body
-    if remeshing.solid is None:
-        check_watertight(surface, name)
-    remeshing.check(name)
+    check_remeshing(surface, remeshing, name)
     if regions is None:
         regions = {key: painted_on(source, content, key) for key in marked_nodes(content)}
     outlines = {key: region_to_dict(region) for key, region in regions.items()}
@@ -134,18 +123,17 @@ def scan(
 
 
 def painted(path: str | Path | Source, name: str, unit: str | None = None) -> PaintedRegion:
-    """The region painted on the surface in a file, where the point data `patch_NAME` are above 0.
+    """The region painted on the surface in a file, where the point data `patch_NAME` are above 0: the same for every
+    mesh of the organ and for both solvers.
 
-    It is the same for every mesh of the organ and for both solvers. name: without the prefix. path, unit: as in `scan`.
-    Raises StudyError for a file that cannot be read, that has no such data, or whose nodes are all inside or all
-    outside.
+    name: without the prefix. path, unit: as in `scan`. Raises StudyError for a file that cannot be read, that has no
+    such data, or whose nodes are all inside or all outside.
     """
     source = as_source(path, unit)
     return painted_on(source, opened(source), name)
 
 
 def painted_on(source: Source, content: Content, name: str) -> PaintedRegion:
-    """The same as `painted` for a file whose content is read."""
     marked, file = marked_nodes(content), source.path.name
     if name not in marked:
         patches = f"the patches {', '.join(marked)}" if marked else "no point data called patch_NAME"
@@ -156,23 +144,20 @@ def painted_on(source: Source, content: Content, name: str) -> PaintedRegion:
 def true_shape_of(source: Source, **how: Any) -> Shape:
     """The true shape of the surface in a file, the same for meshes of any number of nodes.
 
-    It has the volume of the surface, unless parts of the surface overlap or are lost (true_grid.target_volume). how:
-    the fields of Remeshing. Raises StudyError for a file that cannot be read or repaired, and TypeError for an unknown
-    field.
+    It has the volume of the surface, unless parts of it overlap or are lost (scan_shape.target_volume). how: the fields
+    of Remeshing. Raises StudyError for a file that cannot be read or repaired, and TypeError for an unknown field.
     """
-    remeshing, name = Remeshing(**how), source.path.name
+    remeshing = Remeshing(**how)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # `scan` warns of every change
         surface, recipe = repaired_surface(source, opened(source), remeshing)
-    if remeshing.solid is None:
-        check_watertight(surface, name)
-    remeshing.check(name)
+    check_remeshing(surface, remeshing, source.path.name)
     recipe |= remeshing.recipe
     return shape_of(grid_from(level_arrays(recipe, surface)), recipe["name"], remeshing.wall)
 
 
 def level_arrays(recipe: Mapping[str, Any], surface: RepairedSurface) -> dict[str, np.ndarray]:
-    """The grid of the true shape of a repaired surface, as arrays (jobs.LEVEL); recipe: of a scan."""
+    """The grid of the true shape of a repaired surface (jobs.LEVEL); recipe: of a scan."""
     deciding = {key: recipe[key] for key in LEVEL_KEYS if key in recipe} | {"kind": "level"}
     return level_of(deciding, {"points": surface.points, "triangles": surface.triangles})
 
@@ -193,28 +178,15 @@ def repaired_surface(source: Source, content: Content, remeshing: Remeshing) -> 
     return surface, recipe | {"holes": bool(remeshing.holes)} | source.recipe
 
 
-def raw_surface(path: Path) -> tuple[np.ndarray, np.ndarray]:
-    """Points (n, 3) in the unit of the file and triangles (t, 3) of its surface, or of the boundary of its tetrahedra.
-
-    Raises StudyError for a file without cells or with coordinates that are not finite.
-    """
-    return surface_of(opened(Source(path)), path.name)
-
-
-def surface_of(content: Content, name: str) -> tuple[np.ndarray, np.ndarray]:
-    """Points and triangles of the content of a file, as in raw_surface; name: of the file."""
-    check_finite(content.points, name)
-    solid = len(content.tetrahedra) > 0
-    return content.points, boundary_triangles(content.tetrahedra) if solid else content.triangles
-
-
 def in_metres(source: Source, content: Content) -> tuple[np.ndarray, np.ndarray]:
-    """Points (n, 3) [m] and triangles (t, 3) of the surface of a file.
+    """Points (n, 3) [m] and triangles (t, 3) of the surface of a file, or of the boundary of its tetrahedra.
 
-    Raises StudyError for a size that no organ has, for a body too far from the origin, and if the unit is unknown.
+    Raises StudyError for coordinates that are not finite, for a size that no organ has, for a body too far from the
+    origin, and if the unit is unknown.
     """
-    name = source.path.name
-    points, triangles = surface_of(content, name)
+    name, points = source.path.name, content.points
+    check_finite(points, name)
+    triangles = boundary_triangles(content.tetrahedra) if len(content.tetrahedra) else content.triangles
     metres = source.metres(content.longest_side, content.unit)
     check_range(metres * content.longest_side, name, SMALLEST, LARGEST)
     distance = metres * float(np.linalg.norm(points.mean(axis=0)))
@@ -226,27 +198,24 @@ def in_metres(source: Source, content: Content) -> tuple[np.ndarray, np.ndarray]
     return points * metres, triangles
 
 
-def as_it_is(surface: RepairedSurface, recipe: dict[str, Any], fill: bool) -> OrganMesh:
-    """The repaired surface with the triangles of the file; fill: with tetrahedra. Raises StudyError if it is unfit."""
-    check_surface(surface.points, surface.triangles, recipe["file"])
-    check_one_part(surface.triangles, recipe["file"])
-    check_amount(signed_volume(surface.points, surface.triangles), recipe["file"])
-    none = np.empty((0, 4), np.int64)
-    mesh = OrganMesh(recipe["name"], surface.points, surface.triangles, none, len(surface.points), {}, recipe)
-    return fill_mesh(mesh) if fill else mesh
-
-
-def check_watertight(surface: RepairedSurface, name: str) -> None:
-    """Raise StudyError unless the surface is closed and encloses the volume of an organ."""
-    left = len(border(surface.triangles))
-    if left:
-        raise StudyError(f"{name}: the surface is open at {left} edges; close the holes (--close-holes)")
-    check_volume(surface.points, surface.triangles, name)
-    check_amount(signed_volume(surface.points, surface.triangles), name)
+def check_remeshing(surface: RepairedSurface, how: Remeshing, name: str) -> None:
+    """Raise StudyError unless the surface is closed and encloses the volume of an organ (of a shell to be filled
+    nothing is asked), and for a length that is not finite or too small."""
+    if how.solid is None:
+        left = len(border(surface.triangles))
+        if left:
+            raise StudyError(f"{name}: the surface is open at {left} edges; close the holes (--close-holes)")
+        check_volume(surface.points, surface.triangles, name)
+        check_amount(signed_volume(surface.points, surface.triangles), name)
+    if not 0 <= how.smooth < np.inf:
+        raise StudyError(f"{name}: smoothing over {1e3 * how.smooth:g} mm asked for; give 0 or a few millimetres")
+    if how.solid is not None and not 0 <= how.solid < np.inf:
+        raise StudyError(f"{name}: cannot close openings of {1e3 * how.solid:g} mm; give 0 or a few millimetres")
+    if how.wall is not None and not 0 < how.wall < np.inf:
+        raise StudyError(f"{name}: a wall of {1e3 * how.wall:g} mm asked for; give a thickness above 0")
 
 
 def check_amount(volume: float, name: str) -> None:
-    """Raise StudyError for a volume [m³] that is smaller than that of any organ."""
     if abs(volume) < LEAST_VOLUME:
         raise StudyError(
             f"{name}: the surface encloses {1e6 * volume:.2g} mL, and no organ is smaller than 1 mL; correct the unit "

@@ -9,7 +9,7 @@ import numpy as np
 
 from studies.geometry.doctor.findings import Finding, findings_of
 from studies.geometry.doctor.measures import describe_springs, describe_surface, describe_tetrahedra, describe_welding
-from studies.geometry.files.content import Content, Part, parts_in
+from studies.geometry.files.content import Content, parts_in
 from studies.geometry.files.opening import opened
 from studies.geometry.files.reading import weld
 from studies.geometry.files.units import UNITS, Source, as_source, check_range, likely_units
@@ -28,20 +28,17 @@ class Findings:
     """Numbers by name, SI units, JSON-able; docs/meshes.md has the list."""
     findings: tuple[Finding, ...]
     command: str | None = None
-    """A command line that repairs everything, as a trial has shown (studies.geometry.api.advice); None if there is
-    none, or before the trials."""
+    """A command line that repairs everything, as a trial has shown (api/advice.py), or None."""
 
     @property
     def clean(self) -> bool:
-        """Whether the mesh has no fault."""
         return not self.findings
 
     def to_dict(self) -> dict[str, Any]:
-        """JSON-able form: {"name", "clean", "measures": {...}, "findings": [{"code", "count", "sentence", "mend"}],
-        "command"}."""
+        """JSON-able form, as docs/meshes.md has it."""
         rows = [vars(finding) for finding in self.findings]
-        data = {"name": self.name, "clean": self.clean, "measures": self.measures, "findings": rows}
-        return data | {"command": self.command}
+        data = {"name": self.name, "clean": self.clean, "measures": self.measures}
+        return data | {"findings": rows, "command": self.command}
 
 
 def examine(
@@ -63,9 +60,13 @@ def examine(
     # An STL file repeats the corners of every triangle, which is no fault.
     repeats = file.path.suffix.lower() == ".stl"
     welding = describe_welding(content.points, content.cells, repeats)
-    welding["part_list"] = [] if welding["bad_points"] else [row_of(part, metres) for part in parts_in(content)]
     points, cells = content.points, content.cells
-    points, cells = (points, cells) if welding["bad_points"] else weld(points, cells)
+    welding["part_list"] = []
+    if not welding["bad_points"]:
+        for part in parts_in(content):
+            row = {"number": part.number, "name": part.name, "triangles": part.triangles}
+            welding["part_list"].append(row | {"size": [metres * side for side in part.size]})
+        points, cells = weld(points, cells)
     return examine_cells(file.path.name, points * metres, cells, used | welding, tissue)
 
 
@@ -79,12 +80,6 @@ def unit_of(source: Source, content: Content) -> tuple[dict[str, Any], float]:
     certain = explicit is not None or source.longest_side is not None or likely == ["m"]
     metres = source.metres(content.longest_side, unit) if certain else source.scale * UNITS[unit]
     return {"unit": unit, "unit_said": certain}, metres
-
-
-def row_of(part: Part, metres: float) -> dict[str, Any]:
-    """A part as a JSON-able row, with its size [m]; metres: per unit of the file."""
-    size = [metres * side for side in part.size]
-    return {"number": part.number, "name": part.name, "triangles": part.triangles, "size": size}
 
 
 def examine_cells(

@@ -3,23 +3,26 @@
 from typing import Any
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial.distance import pdist
 
 from massspring import MassSpringError, Material, step_limit, surface_body, tetrahedral_body
 from studies.base.errors import StudyError
 from studies.geometry.files.reading import weld
 from studies.geometry.mesh.checks import SLIVER, pinched_nodes
-from studies.geometry.mesh.organ_mesh import signed_volume, tetrahedron_volumes, triangle_areas, unique_edges
+from studies.geometry.mesh.organ_mesh import (
+    connected,
+    counted_edges,
+    signed_volume,
+    tetrahedron_volumes,
+    triangle_areas,
+    unique_edges,
+)
 from studies.geometry.mesh.quality import dihedral_angles, tetrahedron_radius_ratio, triangle_radius_ratio
 from studies.geometry.surface.intersections import crossing_triangles
 from studies.geometry.surface.repair import border, edge_pairs, oriented, part_of, without_repeats
 
 MEASURED_BODY = 6000
-"""Most nodes of a body for which the largest frequency of the springs is computed, which takes seconds; beyond, the
-time step is estimated."""
-
+"""Most nodes of a body for which the largest frequency of the springs is computed, which takes seconds."""
 RIM = 500
 """Most nodes of a border between which distances are measured; of more, every k-th is taken."""
 
@@ -30,11 +33,10 @@ def describe_welding(points: np.ndarray, cells: np.ndarray, repeats: bool) -> di
     repeats: whether the format repeats points, which then do not count as duplicates.
     """
     bad = int((~np.isfinite(points).all(axis=1)).sum())
-    measures: dict[str, Any] = {"bad_points": bad, "points_in_file": len(points)}
     used = len(np.unique(cells))
-    measures["unused_points"] = len(points) - used
-    measures["duplicate_points"] = 0 if bad or repeats else used - len(weld(points, cells)[0])
-    return measures
+    twice = 0 if bad or repeats else used - len(weld(points, cells)[0])
+    unused = len(points) - used
+    return {"bad_points": bad, "points_in_file": len(points), "unused_points": unused, "duplicate_points": twice}
 
 
 def describe_surface(points: np.ndarray, triangles: np.ndarray) -> dict[str, Any]:
@@ -45,8 +47,7 @@ def describe_surface(points: np.ndarray, triangles: np.ndarray) -> dict[str, Any
     measures: dict[str, Any] = {"nodes": len(points), "triangles": len(triangles), "collapsed_triangles": collapsed}
     measures["duplicate_triangles"] = len(triangles) - len(sound) - collapsed
     measures |= describe_edges(sound)
-    measures |= describe_parts(points, sound, measures)
-    measures |= describe_size(points, sound)
+    measures |= describe_parts(points, sound, measures) | describe_size(points, sound)
     listed = measures["holes"] and measures["two_sided"]
     measures["hole_list"] = hole_list(points, oriented(sound, "")[0]) if listed else []
     measures["self_intersections"] = len(crossing_triangles(points, sound))
@@ -54,9 +55,8 @@ def describe_surface(points: np.ndarray, triangles: np.ndarray) -> dict[str, Any
 
 
 def describe_edges(triangles: np.ndarray) -> dict[str, Any]:
-    """Measures of the connections of triangles (t, 3): open, crowded and disagreeing edges, holes, pinched nodes."""
-    half = triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
-    _, counts = np.unique(np.sort(half, axis=1), axis=0, return_counts=True)
+    """Connections of triangles (t, 3): open, crowded and disagreeing edges, holes, pinched nodes."""
+    _, counts = counted_edges(triangles)
     _, agree = edge_pairs(triangles)
     open_edges, crowded = int((counts == 1).sum()), int((counts > 2).sum())
     try:
@@ -65,7 +65,7 @@ def describe_edges(triangles: np.ndarray) -> dict[str, Any]:
         turned, two_sided = triangles, False
     measures: dict[str, Any] = {
         "open_edges": open_edges,
-        "holes": hole_count(turned) if open_edges else 0,
+        "holes": len(set(borders(turned)[1])) if open_edges else 0,
         "crowded_edges": crowded,
         "two_sided": two_sided,
         "disagreeing_edges": int((~agree).sum()),
@@ -78,17 +78,10 @@ def describe_edges(triangles: np.ndarray) -> dict[str, Any]:
     return measures
 
 
-def hole_count(triangles: np.ndarray) -> int:
-    """Number of connected borders of triangles (t, 3)."""
-    return len(set(borders(triangles)[1]))
-
-
 def borders(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Nodes on borders (n,), and the number of the border of each (n,)."""
     nodes, local = np.unique(border(triangles), return_inverse=True)
-    i, j = local.reshape(-1, 2).T
-    graph = coo_array((np.ones(len(i)), (i, j)), shape=(len(nodes), len(nodes)))
-    return nodes, connected_components(graph, directed=False)[1]
+    return nodes, connected(local.reshape(-1, 2), len(nodes))
 
 
 def hole_list(points: np.ndarray, triangles: np.ndarray) -> list[dict[str, Any]]:
@@ -106,8 +99,8 @@ def hole_list(points: np.ndarray, triangles: np.ndarray) -> list[dict[str, Any]]
 def describe_parts(points: np.ndarray, triangles: np.ndarray, surface: dict[str, Any]) -> dict[str, Any]:
     """Numbers of separate parts, lumens, inverted parts, and handles ("genus"); surface: measures of `describe_edges`.
 
-    An inverted part inside the box of the largest part bounds a lumen. Lumens and inverted parts are counted only for
-    closed, oriented surfaces, handles only if the surface is also manifold.
+    An inverted part inside the box of the largest part bounds a lumen. Counted only for closed, oriented surfaces,
+    handles only if they are also manifold.
     """
     parts = part_of(triangles)
     pieces = [triangles[parts == k] for k in range(int(parts.max()) + 1)] if len(parts) else []
@@ -131,17 +124,17 @@ def describe_size(points: np.ndarray, triangles: np.ndarray) -> dict[str, Any]:
     used = points[np.unique(triangles)]
     size = np.ptp(used, axis=0) if len(used) else np.zeros(3)
     edges = unique_edges(triangles)
-    lengths = np.linalg.norm(points[edges[:, 0]] - points[edges[:, 1]], axis=1)
     ratio = triangle_radius_ratio(points, triangles)
-    areas = triangle_areas(points, triangles)
+    area = float(triangle_areas(points, triangles).sum())
+    volume = signed_volume(points, triangles) if len(triangles) else 0.0
     return {
         "size": [float(side) for side in size],
         "diagonal": float(np.linalg.norm(size)),
         "distance": float(np.linalg.norm(used.mean(axis=0))) if len(used) else 0.0,
-        "area": float(areas.sum()),
-        "volume": signed_volume(points, triangles) if len(triangles) else 0.0,
-        "thickness": 2.0 * abs(signed_volume(points, triangles)) / float(areas.sum()) if areas.sum() > 0 else 0.0,
-        "edge": spread(lengths),
+        "area": area,
+        "volume": volume,
+        "thickness": 2.0 * abs(volume) / area if area > 0 else 0.0,
+        "edge": spread(np.linalg.norm(points[edges[:, 0]] - points[edges[:, 1]], axis=1)),
         "triangle_radius_ratio": spread(ratio),
         "worst_triangle": int(ratio.argmin()) if len(ratio) else None,
         "flat_triangles": int((ratio < SLIVER).sum()),
@@ -168,8 +161,7 @@ def spread(values: np.ndarray) -> dict[str, float] | None:
     """Minimum, 1st, 5th and 50th percentile and maximum of values (n,); None without values."""
     if not len(values):
         return None
-    least, first, fifth, half, most = np.percentile(values, [0, 1, 5, 50, 100])
-    return {"min": float(least), "p1": float(first), "p5": float(fifth), "p50": float(half), "max": float(most)}
+    return dict(zip(("min", "p1", "p5", "p50", "max"), np.percentile(values, [0, 1, 5, 50, 100]).tolist(), strict=True))
 
 
 def describe_springs(
@@ -179,8 +171,8 @@ def describe_springs(
     surface: dict[str, Any],
     tissue: tuple[float, float],
 ) -> dict[str, Any]:
-    """Shortest edge [m] of the surface and largest stable time step [s] of springs on the mesh (docs/theory.md,
-    eq. 5.2, undamped).
+    """Shortest edge [m] of the surface and largest stable time step [s] of springs on it (docs/theory.md, eq. 5.2,
+    undamped).
 
     surface: measures of `describe_surface`; tissue: shear modulus [Pa] and density [kg/m^3]. The step follows from the
     largest frequency of the body, if one can be made with up to MEASURED_BODY nodes ("measured"). Else it is the time

@@ -4,11 +4,10 @@ file has names, else by connectivity."""
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import KDTree
 
 from studies.base.errors import StudyError
+from studies.geometry.mesh.organ_mesh import connected
 
 WELD = 1e-7
 """Points nearer than this fraction of the diagonal are one point: the single precision of STL files."""
@@ -58,7 +57,6 @@ class Content:
 
     @property
     def has_all_points(self) -> bool:
-        """Whether all points that cells use exist."""
         return bool(self.cells.min(initial=0) >= 0 and self.cells.max(initial=-1) < len(self.points))
 
 
@@ -137,7 +135,6 @@ def chosen(content: Content, part: str | None, name: str) -> Content:
 
 
 def listed(names: tuple[str, ...], count: int) -> str:
-    """The parts in words."""
     if not names:
         return f"{count} part{'s' * (count != 1)}, numbered from 1 by their size"
     more = f" and {count - LISTED} more" if count > LISTED else ""
@@ -155,10 +152,7 @@ def numbered(content: Content) -> tuple[np.ndarray, tuple[str, ...]]:
     if len(content.tetrahedra) or not len(content.triangles) or not finite:
         return np.zeros(len(content.triangles), np.int64), ()
     same = coincident(content.points)[content.triangles]
-    ends = same[:, [0, 1]].T, same[:, [1, 2]].T
-    i, j = np.concatenate(ends, axis=1)
-    graph = coo_array((np.ones(len(i)), (i, j)), shape=(len(content.points),) * 2)
-    label = connected_components(graph, directed=False)[1][same[:, 0]]
+    label = connected(np.concatenate([same[:, [0, 1]], same[:, [1, 2]]]), len(content.points))[same[:, 0]]
     kinds, label = np.unique(label, return_inverse=True)
     low, high = np.full((len(kinds), 3), np.inf), np.full((len(kinds), 3), -np.inf)
     for corner in content.triangles.T:
@@ -174,8 +168,6 @@ def coincident(points: np.ndarray) -> np.ndarray:
     Points coincide if they are within WELD of the diagonal, or if a chain of such points joins them.
     """
     reach = WELD * float(np.linalg.norm(np.ptp(points, axis=0)))
-    i, j = KDTree(points).query_pairs(reach, output_type="ndarray").T
-    graph = coo_array((np.ones(len(i)), (i, j)), shape=(len(points), len(points)))
-    _, label = connected_components(graph, directed=False)
+    label = connected(KDTree(points).query_pairs(reach, output_type="ndarray"), len(points))
     _, first = np.unique(label, return_index=True)
     return first[label]

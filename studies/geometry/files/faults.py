@@ -1,4 +1,4 @@
-"""Messages for files that cannot be read, in place of the errors of the readers."""
+"""What is wrong with a file: checked before it is read, and said in place of the errors of the readers."""
 
 import gzip
 import lzma
@@ -9,12 +9,15 @@ from pathlib import Path
 from xml.etree.ElementTree import ParseError
 
 from studies.base.errors import StudyError
-from studies.geometry.files.estimate import HEADER, check_whole, is_ascii_stl, is_text
 
 FORMATS = "STL, PLY, OBJ, OFF, VTK, VTU, VTP, MSH, glTF, or a label mask in NIfTI or NRRD"
 """Formats that can be read, for messages."""
 HEAD = 65_536
 """Bytes from the start of a file that are searched for a header."""
+HEADER, PER_TRIANGLE = 84, 50
+"""Bytes of the header of a binary STL, and of each of its triangles."""
+LARGE = 100_000_000
+"""Bytes from which on the user is asked first: about two million triangles, which take minutes to check."""
 OTHER_KINDS = {
     b"\x89PNG": "a PNG picture",
     b"\xff\xd8\xff": "a JPEG picture",
@@ -54,21 +57,27 @@ ENDS = {".vtu": b"</VTKFile>", ".vtp": b"</VTKFile>", ".msh": b"$EndElements"}
 """Text near the end of a complete file."""
 
 
+def size_warning(path: Path) -> str | None:
+    """A warning for the user before a LARGE file is read; None for a smaller one."""
+    size = path.stat().st_size
+    return f"{path.name} has {size / 1e6:,.0f} MB; to read and check it can take minutes" if size >= LARGE else None
+
+
 def check_promises(path: Path) -> None:
     """Raise StudyError for a file that is empty, packed by gzip, of another kind, or shorter than its header says."""
-    size = path.stat().st_size
+    size, suffix = path.stat().st_size, path.suffix.lower()
     if not size:
         raise unreadable(path, "it is empty")
     with open(path, "rb") as file:
         head = file.read(HEAD)
-    check_stl(path, head)
-    check_whole(path)
-    kind = other_kind(head)
-    if kind is not None:
-        raise unreadable(path, f"it is {kind}")
+    first = head.lstrip().lower()
+    for start, kind in OTHER_KINDS.items():
+        if first.startswith(start.lower()):
+            raise unreadable(path, f"it is {kind}")
+    if suffix == ".stl" and not is_ascii_stl(head):
+        check_stl(path, head, size)
     if head.startswith(PACKED) and not path.name.lower().endswith((".nii.gz", ".nrrd.gz")):
         raise unreadable(path, "it is packed by gzip: unpack it first")
-    suffix = path.suffix.lower()
     for what, count in re.findall(PROMISES.get(suffix, rb"(?!)()()"), head):
         if int(count) * LEAST_BYTES.get(suffix, 2.0) > size:
             kind = str(what.decode()).lower()
@@ -76,37 +85,44 @@ def check_promises(path: Path) -> None:
             raise unreadable(path, f"its header promises {int(count):,} {things}, but it has only {size:,} bytes")
 
 
-def check_stl(path: Path, head: bytes) -> None:
-    """Raise StudyError for a file called .stl that has another format; head: its first bytes."""
-    if path.suffix.lower() != ".stl" or is_ascii_stl(head):
-        return
+def check_stl(path: Path, head: bytes, size: int) -> None:
+    """Raise StudyError for a file called .stl that is another mesh or a text, or a binary STL that is too short."""
     kind = next((kind for first, kind in NO_STL.items() if head.startswith(first)), None)
     if kind is not None:
         raise unreadable(path, f"it is not an STL file but {kind}: give it the ending of its format")
-    if is_text(head[:HEADER]) and not head.lstrip().startswith(b"solid") and other_kind(head) is None:
-        raise unreadable(path, "it is not an STL file: it is text without facets")
+    # A text that is no STL has letters in the place of the count.
+    if all(byte >= ord(" ") or chr(byte).isspace() for byte in head[:HEADER]) and max(head[:HEADER]) < 0x80:
+        if not head.lstrip().startswith(b"solid"):
+            raise unreadable(path, "it is not an STL file: it is text without facets")
+        return
+    count = int.from_bytes(head[80:84], "little")
+    promised = HEADER + PER_TRIANGLE * count
+    if HEADER <= size < promised:
+        raise StudyError(
+            f"{path.name} is cut short: its header promises {count:,} triangles in {promised:,} bytes, "
+            f"but it has {size:,}; copy or export it again"
+        )
 
 
-def other_kind(head: bytes) -> str | None:
-    """The kind of a file that is not a mesh, from its first bytes; None for any other file."""
-    return next((kind for first, kind in OTHER_KINDS.items() if head.lstrip().lower().startswith(first.lower())), None)
+def is_ascii_stl(head: bytes) -> bool:
+    """Whether a file with this beginning is a text STL; a binary STL may begin with "solid" as well."""
+    return head.lstrip().startswith(b"solid") and (b"facet" in head or b"endsolid" in head)
 
 
 def unreadable(path: Path, reason: str) -> StudyError:
-    """The error for a file that is not a mesh."""
     return StudyError(f"{path.name} is not a mesh that can be read ({reason}); give {FORMATS}")
 
 
 def reason_of(path: Path, error: BaseException, output: str) -> str:
     """Why a reader failed on a file: from the file, else from the `output` of the reader, else from its error."""
-    end = ENDS.get(path.suffix.lower())
-    if (end and end not in tail(path)) or is_open_stl(path):
+    with open(path, "rb") as file:
+        is_text_stl = path.suffix.lower() == ".stl" and is_ascii_stl(file.read(HEAD))
+    end = b"endsolid" if is_text_stl else ENDS.get(path.suffix.lower())
+    if end and end not in tail(path):
         return "it is cut short: its end is missing"
-    comma = comma_of(path)
-    if comma:
-        return comma
-    sentence = sentence_in(output) or (sentence_in(str(error)) if "ReadError" in type(error).__name__ else "")
-    return sentence or next((words for kinds, words in WORDS if isinstance(error, kinds)), OTHERWISE)
+    comma = comma_of(path.read_bytes()) if is_text_stl else ""
+    said = sentence_in(output) or (sentence_in(str(error)) if "ReadError" in type(error).__name__ else "")
+    return comma or said or next((words for kinds, words in WORDS if isinstance(error, kinds)), OTHERWISE)
 
 
 OTHERWISE = "its content does not follow its format"
@@ -131,13 +147,11 @@ def sentence_in(text: str) -> str:
     return ""
 
 
-def comma_of(path: Path) -> str | None:
-    """A sentence on the first line of a text STL with a decimal comma; None if there is none."""
-    if path.suffix.lower() != ".stl" or not is_ascii_stl((data := path.read_bytes())[:HEAD]):
-        return None
+def comma_of(data: bytes) -> str:
+    """A sentence on the first line of a text STL with a decimal comma; "" if there is none."""
     first = re.search(COMMA, data, re.MULTILINE)
     if first is None:
-        return None
+        return ""
     line, text = data[: first.start()].count(b"\n") + 1, " ".join(first[0].decode("ascii", "replace").split())
     return f"line {line} has decimal commas, '{text[:60]}': export it with decimal points"
 
@@ -147,12 +161,3 @@ def tail(path: Path) -> bytes:
     with open(path, "rb") as file:
         file.seek(max(0, path.stat().st_size - (1 << 26)))
         return file.read()
-
-
-def is_open_stl(path: Path) -> bool:
-    """Whether the file is a text STL without its end."""
-    if path.suffix.lower() != ".stl":
-        return False
-    with open(path, "rb") as file:
-        head = file.read(HEAD)
-    return is_ascii_stl(head) and b"endsolid" not in tail(path)

@@ -54,7 +54,6 @@ class Mask:
 
 
 def is_mask(path: Path) -> bool:
-    """Whether the name of the file is that of a NIfTI or NRRD image."""
     return path.name.lower().endswith((*NIFTI, *NRRD))
 
 
@@ -112,7 +111,6 @@ def load_nrrd(path: Path) -> Mask:
 
 
 def missing(name: str, path: Path) -> StudyError:
-    """The error if the package `name`, which reads an image, is not installed."""
     return StudyError(
         f"{path.name} is a label mask, and {name}, which reads it, is not installed; "
         "run pip install 'organbench[masks]'"
@@ -184,7 +182,6 @@ def chosen_label(mask: Mask, part: str | None, name: str) -> int:
 
 
 def voxels_of(labels: np.ndarray) -> dict[int, int]:
-    """Number of voxels of each label except 0."""
     if labels.size and labels.min() >= 0 and labels.max() < FEW:  # counting is faster than sorting
         counts = np.bincount(labels.ravel())
         return {int(k): int(counts[k]) for k in np.flatnonzero(counts) if k}
@@ -193,7 +190,6 @@ def voxels_of(labels: np.ndarray) -> dict[int, int]:
 
 
 def listed(mask: Mask, voxels: dict[int, int]) -> str:
-    """The labels and the numbers of their voxels in words, the largest first."""
     order = sorted(voxels, key=lambda k: -voxels[k])
     rows = [f"{k}{f' ({mask.names[k]})' if k in mask.names else ''} of {voxels[k]:,} voxels" for k in order[:OTHERS]]
     return ", ".join(rows) + (f" and {len(order) - OTHERS} more" if len(order) > OTHERS else "")

@@ -14,9 +14,8 @@ from studies.geometry.files.content import Content, check_content, chosen, fans
 from studies.geometry.files.faults import check_promises, reason_of, unreadable
 from studies.geometry.files.masks import is_mask, read_mask
 from studies.geometry.files.objects import read_objects
-from studies.geometry.files.polydata import is_legacy_polydata, read_legacy
 from studies.geometry.files.units import Source
-from studies.geometry.files.vtk_xml import as_grid, with_arrays
+from studies.geometry.files.vtk_files import as_grid, is_legacy_polydata, read_legacy, with_arrays
 
 OBJECTS = (".off", ".obj", ".glb", ".gltf")
 

@@ -11,7 +11,7 @@ from studies.geometry.files.content import Content, coincident
 from studies.geometry.files.opening import opened
 from studies.geometry.files.units import LARGEST, SMALLEST, Source, as_source, check_range
 from studies.geometry.mesh.checks import check_finite, check_surface, check_tetrahedra
-from studies.geometry.mesh.organ_mesh import OrganMesh, signed_volume, surface_first, tetrahedron_volumes
+from studies.geometry.mesh.organ_mesh import OrganMesh, compact, signed_volume, surface_first, turn_inverted
 
 PATCH = "patch_"
 """Prefix of point data that are attachments."""
@@ -67,7 +67,6 @@ def marked_nodes(content: Content) -> dict[str, np.ndarray]:
 
 
 def warn_about_unit(points: np.ndarray, name: str) -> None:
-    """Warn if a body of points (n, 3) [m] is larger than LARGEST or smaller than SMALLEST."""
     box = np.ptp(points, axis=0) if len(points) else np.zeros(3)
     if box.max() > LARGEST:
         sides = " x ".join(f"{side:.4g}" for side in box)
@@ -81,9 +80,7 @@ def warn_about_unit(points: np.ndarray, name: str) -> None:
 
 def weld(points: np.ndarray, cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Points (n, 3) that the cells use, with coincident ones merged, in the order of the file; and renumbered cells."""
-    cells = coincident(points)[cells]
-    used, renumbered = np.unique(cells, return_inverse=True)
-    return points[used], renumbered.reshape(cells.shape).astype(np.int64)
+    return compact(points, coincident(points)[cells])
 
 
 def tetrahedral(points: np.ndarray, tetrahedra: np.ndarray, flip: bool, recipe: dict) -> OrganMesh:
@@ -92,8 +89,7 @@ def tetrahedral(points: np.ndarray, tetrahedra: np.ndarray, flip: bool, recipe: 
     Raises StudyError for tetrahedra that form no usable body.
     """
     if flip:
-        negative = tetrahedron_volumes(points, tetrahedra) < 0
-        tetrahedra[negative] = tetrahedra[negative][:, [0, 2, 1, 3]]
+        tetrahedra = turn_inverted(points, tetrahedra)
     check_tetrahedra(points, tetrahedra, recipe["file"])
     points, triangles, tetrahedra, count = surface_first(points, tetrahedra)
     return OrganMesh(recipe["name"], points, triangles, tetrahedra, count, {}, recipe)

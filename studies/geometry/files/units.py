@@ -98,7 +98,6 @@ def as_source(path: "str | Path | Source", unit: str | None) -> Source:
 
 
 def check_unit(unit: str) -> None:
-    """Raise StudyError unless `unit` is one of UNITS."""
     if unit not in UNITS:
         raise StudyError(f"unit {unit!r} is not known; use one of {', '.join(UNITS)}")
 

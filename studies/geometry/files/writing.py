@@ -37,7 +37,6 @@ def check_target(path: Path, source: Path | None = None) -> None:
 
 
 def holds_tetrahedra(path: Path) -> bool:
-    """Whether the format of `path` can contain tetrahedra."""
     return path.suffix.lower() in VOLUMES
 
 

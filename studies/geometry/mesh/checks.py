@@ -1,12 +1,12 @@
 """What a mesh must fulfil before a computation. The first fault found raises a StudyError of one sentence."""
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from studies.base.errors import StudyError
 from studies.geometry.mesh.organ_mesh import (
     boundary_triangles,
+    connected,
+    counted_edges,
     signed_volume,
     tetrahedron_volumes,
     triangle_areas,
@@ -20,10 +20,7 @@ SLIVER = 1e-4
 
 def check_surface(points: np.ndarray, triangles: np.ndarray, name: str = "the surface") -> None:
     """Raise StudyError unless points (n, 3) [m] and triangles (t, 3) form closed, outward surfaces without slivers.
-
-    Every point must be used, every edge have two triangles, and the volume be positive. Parts may be separate;
-    intersections are not checked. name: for the message.
-    """
+    Parts may be separate; intersections are not checked. name: for the message."""
     check_indices(points, triangles, 3, name)
     check_edges(triangles, name)
     check_volume(points, triangles, name)
@@ -38,10 +35,8 @@ def check_surface(points: np.ndarray, triangles: np.ndarray, name: str = "the su
 
 
 def check_indices(points: np.ndarray, cells: np.ndarray, corners: int, name: str) -> None:
-    """Raise StudyError unless points (n, 3) are finite and all used, and cells (k, corners) are distinct and valid.
-
-    A valid cell uses existing points, each once.
-    """
+    """Raise StudyError unless points (n, 3) are finite and all used, and cells (k, corners) use existing points, each
+    once."""
     kind = "triangle" if corners == 3 else "tetrahedron"
     if points.ndim != 2 or points.shape[1] != 3:
         raise StudyError(f"{name}: points have shape {points.shape}, expected (n, 3)")
@@ -66,7 +61,6 @@ def check_indices(points: np.ndarray, cells: np.ndarray, corners: int, name: str
 
 
 def check_finite(points: np.ndarray, name: str) -> None:
-    """Raise StudyError unless all coordinates of points (n, 3) are finite."""
     bad = np.flatnonzero(~np.isfinite(points).all(axis=1))
     if len(bad):
         raise StudyError(
@@ -75,10 +69,10 @@ def check_finite(points: np.ndarray, name: str) -> None:
 
 
 def check_edges(triangles: np.ndarray, name: str) -> None:
-    """Raise StudyError unless triangles (t, 3) are a closed, oriented manifold: two triangles at every edge, which run
-    along it in opposite directions, and one fan of triangles at every node."""
+    """Raise StudyError unless triangles (t, 3) are a closed, oriented manifold: two triangles along every edge, in
+    opposite directions, and one fan of triangles at every node."""
     half = triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
-    _, counts = np.unique(np.sort(half, axis=1), axis=0, return_counts=True)
+    counts = counted_edges(triangles)[1]
     if (counts == 1).any():
         raise StudyError(
             f"{name}: the surface is open, {int((counts == 1).sum())} edges have one triangle only; close the holes"
@@ -123,17 +117,12 @@ def pinched_nodes(triangles: np.ndarray) -> np.ndarray:
 
 
 def check_one_part(triangles: np.ndarray, name: str) -> None:
-    """Raise StudyError unless the triangles (t, 3) are connected."""
-    edges = unique_edges(triangles)
-    count = int(triangles.max()) + 1
-    graph = coo_array((np.ones(len(edges)), (edges[:, 0], edges[:, 1])), shape=(count, count))
-    parts = connected_components(graph, directed=False)[0]
+    parts = int(connected(unique_edges(triangles), int(triangles.max()) + 1).max()) + 1
     if parts > 1:
         raise StudyError(f"{name}: the surface has {parts} separate parts; keep one of them")
 
 
 def check_volume(points: np.ndarray, triangles: np.ndarray, name: str) -> None:
-    """Raise StudyError unless the closed surface of points (n, 3) [m] and triangles (t, 3) has a positive volume."""
     volume = signed_volume(points, triangles)
     scale = triangle_areas(points, triangles).sum() ** 1.5
     # A sphere has a volume of 0.094 of this scale; of flat surfaces rounding leaves about 1e-17.
@@ -144,11 +133,8 @@ def check_volume(points: np.ndarray, triangles: np.ndarray, name: str) -> None:
 
 
 def check_tetrahedra(points: np.ndarray, tetrahedra: np.ndarray, name: str = "the mesh") -> None:
-    """Raise StudyError unless points (n, 3) [m] and tetrahedra (k, 4) form a body.
-
-    Every point must be used, no element be inverted or a sliver, and the boundary be a closed manifold. name: for the
-    message.
-    """
+    """Raise StudyError unless points (n, 3) [m], all used, and tetrahedra (k, 4), none inverted or a sliver, form a
+    body whose boundary is a closed manifold. name: for the message."""
     check_indices(points, tetrahedra, 4, name)
     volumes = tetrahedron_volumes(points, tetrahedra)
     negative = np.flatnonzero(volumes < 0)

@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from studies.geometry.mesh.organ_mesh import tetrahedron_volumes, triangle_areas
+from studies.geometry.mesh.organ_mesh import triangle_areas, turn_inverted
 
 SUBDIVIDED = 8
 """Parts of a side of the triangles of a section: the blade is evaluated at the square of this, 64 points."""
@@ -84,10 +84,7 @@ def divided(
         else:
             add(_of_wedges(np.stack([a, b, c, at(a, d), at(b, d), at(c, d)], axis=1)), 1)
             add(np.stack([d, at(a, d), at(b, d), at(c, d)], axis=1), -1)
-    tetrahedra = np.concatenate(parts)
-    turned = tetrahedron_volumes(places, tetrahedra) < 0
-    tetrahedra[turned] = tetrahedra[turned][:, [0, 2, 1, 3]]
-    return tetrahedra, np.concatenate(sides)
+    return turn_inverted(places, np.concatenate(parts)), np.concatenate(sides)
 
 
 def _of_wedges(wedges: np.ndarray) -> np.ndarray:

@@ -4,6 +4,11 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+Surface = tuple[np.ndarray, np.ndarray]
+"""Points (n, 3) [m] and triangles (t, 3)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,7 +44,6 @@ class OrganMesh:
     cuts: dict[str, np.ndarray] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        """Without outer_count the organ is solid: its whole boundary is the outer surface."""
         object.__setattr__(self, "outer_count", self.outer_count or self.surface_count)
 
     @property
@@ -51,7 +55,6 @@ class OrganMesh:
 
     @property
     def hollow(self) -> bool:
-        """Whether there is a lumen."""
         return self.outer_count < self.surface_count
 
     @property
@@ -61,7 +64,7 @@ class OrganMesh:
 
     @property
     def lumen_triangles(self) -> np.ndarray:
-        """Triangles around the lumen, shape (t, 3), flipped so that they enclose it with positive volume."""
+        """Triangles around the lumen, turned so that they enclose it with positive volume, (t, 3)."""
         return self.triangles[self.surfaces["lumen"]][:, ::-1] if self.hollow else np.empty((0, 3), np.int64)
 
     @property
@@ -80,7 +83,7 @@ class OrganMesh:
         return signed_volume(self.points, self.lumen_triangles) if self.hollow else 0.0
 
     def outer(self) -> "OrganMesh":
-        """The outer surface alone, not filled, with its patches."""
+        """The outer surface alone, not filled."""
         return replace(
             self,
             points=self.points[: self.outer_count],
@@ -89,11 +92,6 @@ class OrganMesh:
             surface_count=self.outer_count,
             recipe=self.recipe | {"fill": False},
         )
-
-    @property
-    def area(self) -> float:
-        """Area of the whole boundary [m^2]."""
-        return float(triangle_areas(self.points, self.triangles).sum())
 
     def patch_triangles(self, name: str) -> np.ndarray:
         """Boundary triangles, shape (s, 3), with all three nodes in patch `name`; KeyError if there is none."""
@@ -140,8 +138,32 @@ def triangle_areas(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
 
 def unique_edges(triangles: np.ndarray) -> np.ndarray:
     """Edges of the triangles, each once, shape (e, 2), lower index first, in lexicographic order."""
+    return counted_edges(triangles)[0]
+
+
+def counted_edges(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The same and the number of triangles at each edge, (e,)."""
     pairs = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-    return pairs[np.unique(row_keys(pairs), return_index=True)[1]]
+    _, first, count = np.unique(row_keys(pairs), return_index=True, return_counts=True)
+    return pairs[first], count
+
+
+def mean_edge(points: np.ndarray, triangles: np.ndarray) -> float:
+    """Mean length [m] of the edges of triangles (t, 3)."""
+    edges = unique_edges(triangles)
+    return float(np.linalg.norm(points[edges[:, 0]] - points[edges[:, 1]], axis=1).mean())
+
+
+def connected(ends: np.ndarray, count: int) -> np.ndarray:
+    """For each of `count` nodes the number of its part, (count,); links `ends` (m, 2) join the nodes of a part."""
+    graph = coo_array((np.ones(len(ends)), tuple(ends.T)), shape=(count, count))
+    return connected_components(graph, directed=False)[1]
+
+
+def compact(points: np.ndarray, cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The points that cells (k, m) use, in their order, and the cells by their new numbers."""
+    used, renumbered = np.unique(cells, return_inverse=True)
+    return points[used], renumbered.reshape(cells.shape).astype(np.int64)
 
 
 def tetrahedron_facets(tetrahedra: np.ndarray) -> np.ndarray:
@@ -181,6 +203,13 @@ def tetrahedron_volumes(points: np.ndarray, tetrahedra: np.ndarray) -> np.ndarra
     """Signed volumes [m^3], shape (k,)."""
     a, b, c, d = points[tetrahedra].transpose(1, 0, 2)
     return np.einsum("ij,ij->i", b - a, np.cross(c - a, d - a)) / 6.0
+
+
+def turn_inverted(points: np.ndarray, tetrahedra: np.ndarray) -> np.ndarray:
+    """The tetrahedra (k, 4), those of negative volume with two corners exchanged, in place."""
+    inverted = tetrahedron_volumes(points, tetrahedra) < 0
+    tetrahedra[inverted] = tetrahedra[inverted][:, [0, 2, 1, 3]]
+    return tetrahedra
 
 
 def surface_first(points: np.ndarray, tetrahedra: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:

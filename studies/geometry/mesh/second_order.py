@@ -7,7 +7,7 @@ from scipy.sparse import coo_array, csr_array, diags_array
 from scipy.sparse.linalg import cg
 
 from studies.base.errors import StudyError
-from studies.geometry.mesh.organ_mesh import OrganMesh, tetrahedron_volumes, unique_edges
+from studies.geometry.mesh.organ_mesh import OrganMesh, counted_edges, tetrahedron_volumes, unique_edges
 from studies.geometry.mesh.quality import PAIRS, curved_volume, scaled_coefficients, smallest_jacobian
 from studies.geometry.mesh.smooth_nodes import trial_moves
 from studies.geometry.organs import make_shape
@@ -25,10 +25,8 @@ MOST_BAD = 0.05
 
 @dataclass(frozen=True, eq=False)
 class CurvedMesh:
-    """Quadratic tetrahedra whose mid-side nodes on the boundary lie on the true surface.
-
-    If the vertices lie on it too, the error of the surface is O(h^3) and that of the volume O(h^4). No element is
-    folded anywhere, unless that was allowed.
+    """Quadratic tetrahedra whose mid-side nodes on the boundary lie on the true surface, none folded unless that was
+    allowed. If the vertices lie on it too, the error of the surface is O(h^3) and that of the volume O(h^4).
 
     points: [m], shape (n2, 3); the vertices, numbered as in the straight mesh, come first
     cells: shape (k, 10), vertices and mid-side nodes in the order of the quadratic tetrahedron of VTK
@@ -41,7 +39,6 @@ class CurvedMesh:
 
     @property
     def volume(self) -> float:
-        """Volume [m^3] of the curved body."""
         return curved_volume(self.points, self.cells)
 
     @property
@@ -53,15 +50,9 @@ class CurvedMesh:
 def true_surfaces(mesh: OrganMesh, shape: Shape | None = None) -> list[tuple[np.ndarray, Shape]]:
     """Triangles (t, 3) of each curved part of the boundary, and the shape whose f = 0 they approximate.
 
-    shape: the true shape of a scan, which its recipe does not contain. Raises StudyError for a mesh whose true shape is
-    unknown.
+    shape: the true shape of a scan, which its recipe does not contain. Raises StudyError if it is unknown.
     """
-    kind = mesh.recipe.get("kind")
-    if kind == "ball_octant":
-        round_node = np.isin(np.arange(len(mesh.points)), mesh.patches["sphere"])
-        sphere = mesh.triangles[round_node[mesh.triangles].all(axis=1)]
-        return [(sphere, make_shape("ball", {"radius": mesh.recipe["radius"]}))]
-    if kind == "organ":
+    if mesh.recipe.get("kind") == "organ":
         shape = make_shape(mesh.recipe["organ"], mesh.recipe["parameters"])
     if shape is None:
         raise StudyError(
@@ -75,18 +66,17 @@ def true_outlines(mesh: OrganMesh) -> list[tuple[np.ndarray, Region]]:
     """The edges (e, 2) of the outline of each attachment, and the region whose level = 0 they approximate."""
     outlines = []
     for name, data in mesh.recipe.get("regions", {}).items():
-        half = mesh.patch_triangles(name)[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
-        edges, count = np.unique(np.sort(half, axis=1), axis=0, return_counts=True)
+        edges, count = counted_edges(mesh.patch_triangles(name))
         outlines.append((edges[count == 1], region_from_dict(data)))
     return outlines
 
 
 def make_curved(mesh: OrganMesh, may_fold: bool = False, shape: Shape | None = None) -> CurvedMesh:
-    """The second-order mesh of a filled organ.
+    """The second-order mesh of a filled organ: mid-side nodes of the boundary lie on the true surfaces and outlines,
+    the inner ones follow them.
 
-    Mid-side nodes of the boundary lie on the true surfaces and outlines; the inner ones follow them. shape: as in
-    `true_surfaces`. Raises StudyError for a mesh without tetrahedra or true shape, and (unless `may_fold`) for one so
-    coarse that an element folds.
+    shape: as in `true_surfaces`. Raises StudyError for a mesh without tetrahedra or true shape, and (unless `may_fold`)
+    for one so coarse that an element folds.
     """
     if not len(mesh.tetrahedra):
         raise StudyError(f"{mesh.name}: only a filled mesh can be curved; ask for fill=True")
@@ -120,11 +110,11 @@ def make_curved(mesh: OrganMesh, may_fold: bool = False, shape: Shape | None = N
 
 
 def spread(mesh: OrganMesh, middle: np.ndarray, moved: np.ndarray, fixed: np.ndarray) -> np.ndarray:
-    """Harmonic extension of the displacements of fixed mid-side nodes to all of them [m], shape (e, 3).
+    """Harmonic extension of the displacements of fixed mid-side nodes to all of them [m], shape (e, 3): the least
+    integral of |grad u|^2 with the vertices at rest, so its condition number does not grow with refinement.
 
-    middle (k, 6): mid-side nodes of each tetrahedron; moved (e, 3) [m]; fixed (e,) bool. It minimises the integral of
-    |grad u|^2 with the vertices at rest, so its condition number does not grow with refinement. Raises StudyError if
-    the linear solver fails.
+    middle (k, 6): mid-side nodes of each tetrahedron; moved (e, 3) [m]; fixed (e,) bool. Raises StudyError if the
+    linear solver fails.
     """
     count = len(moved)
     rows, columns = np.repeat(middle, 6, axis=1).ravel(), np.tile(middle, (1, 6)).ravel()

@@ -17,12 +17,10 @@ Bring = Callable[[np.ndarray, np.ndarray], np.ndarray]
 def mend_nodes(
     points: np.ndarray, tetrahedra: np.ndarray, movable: np.ndarray, bring: Bring, least: float
 ) -> np.ndarray:
-    """Points (n, 3) [m] after the movable nodes (n,) bool of tetrahedra below the radius ratio `least` moved.
-
-    The nodes of the worst tetrahedron come first. Each node tries 26 directions with three lengths, is projected back
-    onto its surface by `bring`, and takes the position where the worst of its tetrahedra is best. So the smallest
-    radius ratio around a node never falls.
-    """
+    """Points (n, 3) [m] after the movable nodes (n,) bool of tetrahedra below the radius ratio `least` moved, those of
+    the worst first. Each node tries 26 directions with three lengths, is projected back onto its surface by `bring`,
+    and takes the position where the worst of its tetrahedra is best, so the smallest ratio around a node never
+    falls."""
     points = points.copy()
     trials = trial_moves(REACH)
     for _ in range(ROUNDS):
@@ -46,10 +44,8 @@ def trial_moves(reaches: tuple[float, ...]) -> np.ndarray:
 
 
 def move_node(points: np.ndarray, tetrahedra: np.ndarray, node: int, trials: np.ndarray, bring: Bring) -> bool:
-    """Moves one node, in place, by the best of the trial moves (m, 3) [mean distances to its neighbours].
-
-    Returns False if none is better than staying.
-    """
+    """Moves one node, in place, by the best of the trial moves (m, 3) [mean distances to its neighbours]; False if none
+    is better than staying."""
     around = tetrahedra[(tetrahedra == node).any(axis=1)]
     neighbours = np.setdiff1d(around, node)
     scale = np.linalg.norm(points[neighbours] - points[node], axis=1).mean()

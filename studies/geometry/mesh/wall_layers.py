@@ -10,7 +10,7 @@ from itertools import pairwise
 import numpy as np
 
 from studies.base.errors import StudyError
-from studies.geometry.mesh.organ_mesh import unique_edges, vertex_normals
+from studies.geometry.mesh.organ_mesh import mean_edge, vertex_normals
 from studies.geometry.mesh.quality import MIN_WALL_RATIO, tetrahedron_radius_ratio
 from studies.geometry.mesh.smooth_nodes import mend_nodes
 from studies.geometry.shape.levelset import Shape, at_depth, project
@@ -27,21 +27,15 @@ def suggested_layers(points: np.ndarray, triangles: np.ndarray, wall: float) -> 
     return int(np.clip(round(wall / mean_edge(points, triangles)), 1, MOST_LAYERS))
 
 
-def mean_edge(points: np.ndarray, triangles: np.ndarray) -> float:
-    """Mean length [m] of the edges of triangles (t, 3)."""
-    edges = unique_edges(triangles)
-    return float(np.linalg.norm(points[edges[:, 0]] - points[edges[:, 1]], axis=1).mean())
-
-
 def fill_wall(
     shape: Shape, points: np.ndarray, triangles: np.ndarray, layers: int | None
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Points (n (layers + 1), 3) [m], triangles (2 t, 3) and tetrahedra (3 layers t, 4) of the wall of a hollow shape.
 
-    points (n, 3) [m] on f = 0 and triangles (t, 3) are the outer surface. Its nodes come first; then those of the
-    lumen, whose node i + n faces node i; then those of the layers between them, from outside. The triangles of the
-    lumen look into the lumen, out of the tissue. layers: None: `suggested_layers`. Raises StudyError for a solid shape,
-    for layers outside 1 to MOST_LAYERS, and for a wall that does not fit into the organ or folds or flattens elements.
+    points (n, 3) [m] on f = 0 and triangles (t, 3) are the outer surface, whose nodes come first; then those of the
+    lumen, whose node i + n faces node i; then those of the layers between, from outside. The triangles of the lumen
+    look out of the tissue. layers: None: `suggested_layers`. Raises StudyError for a solid shape, for layers outside 1
+    to MOST_LAYERS, and for a wall that does not fit or folds or flattens elements.
     """
     if shape.wall is None:
         raise StudyError(f"{shape.name} is solid; give it a wall to make it hollow")
@@ -103,8 +97,7 @@ def split_prisms(triangles: np.ndarray, first: np.ndarray) -> np.ndarray:
     """Tetrahedra, shape (3 layers t, 4), of positive volume, of the prisms between rings of nodes.
 
     triangles (t, 3): outward on the outermost ring; first (layers + 1,): index of node 0 of each ring, outermost first.
-    The diagonal of every quadrilateral joins the outer node of its lower column number to the inner node of the higher
-    one, so neighbours agree.
+    A diagonal joins the outer node of the lower column number to the inner node of the higher one, so neighbours agree.
     """
     columns = np.sort(triangles, axis=1)
     even = (np.argsort(triangles, axis=1, kind="stable") * [1, 3, 9]).sum(axis=1)

@@ -9,7 +9,7 @@ import gmsh
 import numpy as np
 
 from studies.base.errors import StudyError
-from studies.geometry.mesh.organ_mesh import boundary_triangles, same_triangles, surface_first, tetrahedron_volumes
+from studies.geometry.mesh.organ_mesh import boundary_triangles, same_triangles, surface_first, turn_inverted
 from studies.geometry.mesh.quality import MIN_DIHEDRAL, MIN_RATIO, dihedral_angles, tetrahedron_radius_ratio
 from studies.geometry.shape.regions import Region
 
@@ -130,9 +130,7 @@ def fill_once(
         raise StudyError("gmsh dropped nodes of the surface when filling it; repair the surface first")
     if (all_points[:count] != points).any() or not same_triangles(boundary_triangles(tetrahedra), triangles):
         raise StudyError("gmsh changed the surface when filling it; repair the surface first")
-    inverted = tetrahedron_volumes(all_points, tetrahedra) < 0
-    tetrahedra[inverted] = tetrahedra[inverted][:, [0, 2, 1, 3]]
-    return all_points, tetrahedra
+    return all_points, turn_inverted(all_points, tetrahedra)
 
 
 def grow_inwards(surface: int, points: np.ndarray) -> None:
@@ -205,8 +203,6 @@ def build_octant(recipe: dict[str, Any], arrays: dict[str, np.ndarray]) -> dict[
     distance = np.linalg.norm(points, axis=1)
     on_sphere = np.abs(distance - 1.0) < 1e-9
     points[on_sphere] /= distance[on_sphere][:, None]
-    inverted = tetrahedron_volumes(points, tetrahedra) < 0
-    tetrahedra[inverted] = tetrahedra[inverted][:, [0, 2, 1, 3]]
-    points, triangles, tetrahedra, count = surface_first(radius * points, tetrahedra)
+    points, triangles, tetrahedra, count = surface_first(radius * points, turn_inverted(points, tetrahedra))
     cells = {"triangles": triangles, "tetrahedra": tetrahedra}
     return {"points": points, **cells, "surface_count": np.array(count), "outer_count": np.array(count)}

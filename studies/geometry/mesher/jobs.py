@@ -133,7 +133,6 @@ def cache_folder() -> Path:
 
 
 def cache_path(recipe: dict[str, Any], arrays: dict[str, np.ndarray]) -> Path:
-    """The file in which the cache stores the arrays of a recipe."""
     name = recipe["name"].encode()[:NAME_BYTES].decode(errors="ignore")
     return cache_folder() / f"{name}-{recipe_hash(recipe, arrays)}.npz"
 
@@ -158,7 +157,6 @@ def code_hash(kind: str) -> str:
 
 
 def maker(kind: str) -> str:
-    """The module that makes a kind of recipe."""
     return MADE_ELSEWHERE.get(kind, MAKERS[0])
 
 
@@ -215,7 +213,6 @@ def run_worker(recipe: dict[str, Any], arrays: dict[str, np.ndarray], limit: flo
 
 
 def wayout(recipe: dict[str, Any]) -> str:
-    """Advice for a mesh that could not be made."""
     if recipe["kind"] in ("scan", "level"):
         return "smooth the surface (--smooth 3), or ask for another node count"
     return "repair the surface, or make a new one (--nodes N)" if recipe["kind"] == "fill" else "try another node count"

@@ -118,7 +118,6 @@ def build_fill(recipe: dict[str, Any], arrays: Arrays) -> Arrays:
 def arrays_of(
     points: np.ndarray, triangles: np.ndarray, tetrahedra: np.ndarray, surface_count: int, outer_count: int
 ) -> Arrays:
-    """The result of the worker by the names of jobs.PARTS."""
     counts = {"surface_count": np.array(surface_count), "outer_count": np.array(outer_count)}
     return {"points": points, "triangles": triangles, "tetrahedra": tetrahedra, **counts}
 

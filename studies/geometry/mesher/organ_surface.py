@@ -4,14 +4,14 @@ import mmgpy
 import numpy as np
 
 from studies.base.errors import StudyError
-from studies.geometry.mesh.organ_mesh import triangle_areas
+from studies.geometry.mesh.organ_mesh import Surface, compact, triangle_areas
 from studies.geometry.mesher.gmsh_calls import Remesher, fresh_model
 from studies.geometry.mesher.process import stage
 from studies.geometry.shape.levelset import Shape
 from studies.geometry.shape.regions import ON_CURVE, Region
 from studies.geometry.surface.first_surface import first_surface
 from studies.geometry.surface.fit import Fit, fitted
-from studies.geometry.surface.node_count import FEWEST, Surface, surface_with
+from studies.geometry.surface.node_count import FEWEST, surface_with
 from studies.geometry.surface.snap import outlined, relax
 
 NEARNESS = 0.2
@@ -42,9 +42,7 @@ class EvenRemesher:
         """Points (n, 3) [m] near the surface and outward triangles (t, 3) with edges of about `size` [m]."""
         mesh = mmgpy.MmgMeshS(self.points, self.triangles)
         mesh.remesh(hsiz=size, hausd=self.nearness * size, angle=NO_RIDGES, verbose=QUIET)
-        triangles = np.asarray(mesh.get_triangles()).astype(np.int64)
-        used, renumbered = np.unique(triangles, return_inverse=True)
-        return np.asarray(mesh.get_vertices(), float)[used], renumbered.reshape(triangles.shape)
+        return compact(np.asarray(mesh.get_vertices(), float), np.asarray(mesh.get_triangles()))
 
 
 def close_surface(shape: Shape, nodes: int, regions: list[Region], curved: bool) -> Surface:
@@ -124,7 +122,6 @@ def even(shape: Shape, nodes: int, regions: list[Region], remesher: Remesher, st
 
 
 def area_of(surface: Surface) -> float:
-    """The area of a surface [m²]."""
     return float(triangle_areas(*surface).sum())
 
 
@@ -151,7 +148,6 @@ def snap_if_it_fits(shape: Shape, points: np.ndarray, triangles: np.ndarray, reg
 
 
 def is_met(region: Region, points: np.ndarray, triangles: np.ndarray) -> bool:
-    """Whether some triangle lies inside the region, outline included."""
     inside = region.level(points) <= ON_CURVE * np.linalg.norm(np.ptp(points, axis=0))
     return bool(inside[triangles].all(axis=1).any())
 

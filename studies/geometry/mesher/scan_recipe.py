@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from studies.base.errors import StudyError
-from studies.geometry.mesh.organ_mesh import signed_volume, triangle_areas
+from studies.geometry.mesh.organ_mesh import Surface, signed_volume, triangle_areas
 from studies.geometry.mesher.organ_recipe import finish
 from studies.geometry.mesher.organ_surface import MOST_SPARE, EvenRemesher
 from studies.geometry.mesher.process import Arrays, stage, work
@@ -17,7 +17,6 @@ from studies.geometry.scanned.fidelity import NOTABLE, fidelity
 from studies.geometry.scanned.level_grid import grid_from, shape_of
 from studies.geometry.scanned.scan_shape import (
     COARSEST,
-    Surface,
     cell_for,
     faithful,
     levelled,

@@ -5,11 +5,11 @@ from typing import Any
 
 import gmsh
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from studies.base.errors import StudyError
 from studies.geometry.mesh.organ_mesh import (
+    Surface,
+    connected,
     signed_volume,
     tetrahedron_facets,
     tetrahedron_volumes,
@@ -29,7 +29,6 @@ SHARP = 15.0
 """Angle of a triangle of the section [degrees] below which it may prevent the fill of the body next to it."""
 FEWEST_CELLS = 30
 """Fewest tetrahedra of a separate piece."""
-Surface = tuple[np.ndarray, np.ndarray]
 
 
 def check_clear(shape: Shape, cuts: list[dict[str, Any]], held: list[Region], nodes: int) -> None:
@@ -215,10 +214,8 @@ def why_not_filled(points: np.ndarray, faces: np.ndarray, error: StudyError) -> 
 
 
 def _pieces(triangles: np.ndarray, count: int) -> list[np.ndarray]:
-    """The separate closed surfaces among triangles (t, 3)."""
     pairs = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]]])
-    graph = coo_array((np.ones(len(pairs)), pairs.T), shape=(count, count))
-    label = connected_components(graph, directed=False)[1][triangles[:, 0]]
+    label = connected(pairs, count)[triangles[:, 0]]
     return [triangles[label == k] for k in np.unique(label)]
 
 

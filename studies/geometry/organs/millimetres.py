@@ -16,7 +16,6 @@ MARGIN = 12.0
 
 
 def check_lengths(organ: str, **lengths: float) -> None:
-    """Raise StudyError unless every length [mm] is a finite number above 0."""
     for name, value in lengths.items():
         if not 0 < value < np.inf:
             raise StudyError(f"{organ}: {name} = {value} mm is not a length; give a finite number above 0")
@@ -85,6 +84,5 @@ def probe_near(shape: Shape, seed: Vector) -> PalpationPoint:
 
 
 def unit(x: float, y: float, z: float) -> Vector:
-    """The vector scaled to length 1."""
     length = float(np.sqrt(x * x + y * y + z * z))
     return float(x) / length, float(y) / length, float(z) / length

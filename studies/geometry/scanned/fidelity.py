@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from studies.geometry.mesh.organ_mesh import signed_volume, triangle_areas, unique_edges
+from studies.geometry.mesh.organ_mesh import Surface, mean_edge, signed_volume, triangle_areas
 from studies.geometry.surface.distance import distance_to_surface
 from studies.geometry.surface.node_count import handles_of
 
@@ -14,8 +14,6 @@ NOTABLE = 0.02
 """The user is warned of a distance beyond this share of the diagonal or beyond the mean edge, whichever is smaller, and
 of a relative change of the volume beyond this share."""
 
-Surface = tuple[np.ndarray, np.ndarray]
-
 
 def fidelity(file: Surface, mesh: Surface) -> dict[str, Any]:
     """Deviations of a mesh from the surface of a file, each as points (n, 3) [m] and closed triangles (t, 3).
@@ -24,7 +22,6 @@ def fidelity(file: Surface, mesh: Surface) -> dict[str, Any]:
     is [m]; volume_file, volume_mesh [m^3]; diagonal: of the box of the file [m]; edge: mean edge of the mesh [m];
     handles: number of handles of the mesh.
     """
-    edges = unique_edges(mesh[1])
     return {
         "file_to_mesh": spread(file, mesh),
         "mesh_to_file": spread(mesh, file),
@@ -32,7 +29,7 @@ def fidelity(file: Surface, mesh: Surface) -> dict[str, Any]:
         "volume_mesh": signed_volume(*mesh),
         "diagonal": float(np.linalg.norm(np.ptp(file[0][np.unique(file[1])], axis=0))),
         "handles": handles_of(mesh[0][np.unique(mesh[1])], mesh[1]),
-        "edge": float(np.linalg.norm(mesh[0][edges[:, 0]] - mesh[0][edges[:, 1]], axis=1).mean()),
+        "edge": mean_edge(*mesh),
     }
 
 

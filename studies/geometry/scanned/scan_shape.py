@@ -7,7 +7,7 @@ from scipy.optimize import root_scalar
 from skimage.measure import marching_cubes
 
 from studies.base.errors import StudyError
-from studies.geometry.mesh.organ_mesh import signed_volume
+from studies.geometry.mesh.organ_mesh import Surface, signed_volume
 from studies.geometry.scanned.distance_grid import box_of, distance_grid, squared_distance
 from studies.geometry.scanned.fidelity import NOTABLE
 from studies.geometry.scanned.level_grid import DistanceGrid, shape_of
@@ -35,8 +35,6 @@ TIGHT = 1.0
 """Smallest thickening of a wall in cells, which makes it tight on the grid."""
 BLUNT = 0.7
 """Standard deviation of the Gaussian, in cells, that removes the steps of the cells."""
-
-Surface = tuple[np.ndarray, np.ndarray]
 
 
 def scan_shape(points: np.ndarray, triangles: np.ndarray, nodes: int, smooth: float = 0.0, name: str = "scan") -> Shape:

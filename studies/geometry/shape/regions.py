@@ -18,8 +18,6 @@ ON_CURVE = 1e-10
 
 
 class Region(Protocol):
-    """Part of space in which an organ is attached."""
-
     def level(self, points: np.ndarray) -> np.ndarray:
         """Signed level [m], shape (n,), of points (n, 3) [m]: negative inside."""
         ...
@@ -49,7 +47,6 @@ class BallRegion:
     radius: float
 
     def level(self, points: np.ndarray) -> np.ndarray:
-        """Signed distance [m], shape (n,), of points (n, 3) [m]. Raises StudyError unless the radius is above 0."""
         if not self.radius > 0:
             raise StudyError(f"a ball region of radius {self.radius} m is empty; give a radius above 0")
         return np.linalg.norm(np.asarray(points, float) - self.center, axis=1) - self.radius

@@ -6,7 +6,13 @@ from functools import cached_property
 import numpy as np
 
 from studies.base.errors import StudyError
-from studies.geometry.mesh.organ_mesh import triangle_areas, triangle_normals, unique_edges
+from studies.geometry.mesh.organ_mesh import (
+    Surface,
+    mean_edge,
+    triangle_areas,
+    triangle_normals,
+    unique_edges,
+)
 from studies.geometry.mesh.quality import triangle_radius_ratio
 from studies.geometry.shape.levelset import Shape
 from studies.geometry.shape.regions import Region
@@ -23,8 +29,6 @@ from studies.geometry.surface.sides import (
     with_middles,
 )
 from studies.geometry.surface.snap import outlined
-
-Surface = tuple[np.ndarray, np.ndarray]
 
 FLOOR = 0.3
 """Smallest radius ratio of a triangle that a new node may make; the fill has good elements above 0.2."""
@@ -58,9 +62,7 @@ def fitted(shape: Shape, base: Surface, nodes: int, regions: Sequence[Region], t
     """
     fit = Fit(shape, base, [], truth, curved)
     fit.grow(len(base[0]) + round(BEFORE * (nodes - len(base[0]))))
-    edges = unique_edges(fit.triangles)
-    edge = float(np.linalg.norm(np.diff(fit.points[edges], axis=1), axis=2).mean())
-    fit = Fit(shape, outlined(shape, *fit.surface, regions, BESIDE * edge), regions, truth, curved)
+    fit = Fit(shape, outlined(shape, *fit.surface, regions, BESIDE * mean_edge(*fit.surface)), regions, truth, curved)
     fit.fill_outlines(nodes)
     fit.grow(nodes)
     fit.split_longest(nodes)
@@ -83,7 +85,6 @@ class Fit:
 
     @cached_property
     def gaps(self) -> ChangingFacets:
-        """Distances between the true surface and this one."""
         return ChangingFacets(*self.truth)
 
     def deviation(self) -> float:
@@ -124,8 +125,7 @@ class Fit:
         """
         (samples, ahead), (places, behind) = self.distances()
         targets, away = np.concatenate([samples, places]), np.concatenate([ahead, behind])
-        edges = unique_edges(self.triangles)
-        apart = APART * float(np.linalg.norm(np.diff(self.points[edges], axis=1), axis=2).mean())
+        apart = APART * mean_edge(*self.surface)
         added, left = 0, np.argsort(-away, kind="stable")
         for _ in range(TRIED + count):
             left = left[away[left] > ENOUGH * self.size]
@@ -166,7 +166,6 @@ class Fit:
                     break
 
     def split_longest(self, nodes: int) -> None:
-        """Splits the longest edges until there are `nodes` nodes, or none can be split."""
         while len(self.points) < nodes and self.split_first(unique_edges(self.triangles)):
             pass
 
@@ -180,12 +179,10 @@ class Fit:
         return False
 
     def find_outlines(self) -> np.ndarray:
-        """Edges (o, 2) of the outlines of all regions."""
         return np.concatenate([np.empty((0, 2), int), *(outline_edges(*self.surface, r) for r in self.regions)])
 
     @property
     def surface(self) -> Surface:
-        """Points and triangles."""
         return self.points, self.triangles
 
     def split(self, edge: np.ndarray, place: np.ndarray, on_outline: bool) -> bool:
@@ -213,7 +210,6 @@ class Fit:
         return True
 
     def is_outline(self, edge: np.ndarray) -> bool:
-        """Whether an edge (2,), lower index first, belongs to an outline."""
         return bool((edge == self.outlines).all(axis=1).any())
 
     def crosses(self, points: np.ndarray, triangles: np.ndarray, node: int) -> bool:

@@ -134,12 +134,10 @@ def boxes_meet(p: np.ndarray, q: np.ndarray, s: np.ndarray, t: np.ndarray) -> np
 
 
 def dot(u: np.ndarray, v: np.ndarray) -> np.ndarray:
-    """Inner products along the last axis."""
     return (u * v).sum(axis=-1)
 
 
 def unit(u: np.ndarray) -> np.ndarray:
-    """Vectors scaled to length 1 along the last axis; zero stays zero."""
     return u / np.maximum(np.linalg.norm(u, axis=-1, keepdims=True), 1e-300)
 
 
@@ -178,7 +176,6 @@ def children(pairs: np.ndarray) -> np.ndarray:
 
 
 def touching(pairs: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
-    """The pairs whose boxes have a point in common."""
     a, b = pairs.T
     keep = np.ones(len(pairs), bool)
     for k in range(3):

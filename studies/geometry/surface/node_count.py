@@ -5,12 +5,10 @@ from collections.abc import Callable
 import numpy as np
 
 from studies.base.errors import StudyError
-from studies.geometry.mesh.organ_mesh import signed_volume, unique_edges
+from studies.geometry.mesh.organ_mesh import Surface, signed_volume, unique_edges
 from studies.geometry.mesh.quality import triangle_radius_ratio
 from studies.geometry.shape.levelset import Shape, project
 from studies.geometry.surface.edit import with_node_count
-
-Surface = tuple[np.ndarray, np.ndarray]
 
 TOLERANCE = 0.02
 """Largest relative deviation from the node count that edits of single nodes correct (or 5 nodes)."""

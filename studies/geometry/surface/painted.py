@@ -4,8 +4,7 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from studies.base.errors import StudyError
-from studies.geometry.mesh.organ_mesh import triangle_areas
-from studies.geometry.mesh.wall_layers import mean_edge
+from studies.geometry.mesh.organ_mesh import mean_edge, triangle_areas
 from studies.geometry.shape.regions import PaintedRegion
 
 WIDTH = 0.75

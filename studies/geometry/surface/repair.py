@@ -3,15 +3,9 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from studies.base.errors import StudyError
-from studies.geometry.mesh.checks import SLIVER
-from studies.geometry.mesh.organ_mesh import signed_volume, triangle_areas
-from studies.geometry.mesh.quality import triangle_radius_ratio
-
-Surface = tuple[np.ndarray, np.ndarray]
+from studies.geometry.mesh.organ_mesh import Surface, compact, connected, signed_volume, triangle_areas
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,8 +50,7 @@ def mend(points: np.ndarray, triangles: np.ndarray, name: str, holes: bool = Fal
     if signed_volume(points, triangles) < 0:
         triangles = triangles[:, ::-1].copy()
         remarks.append("the surface was inverted and has been flipped")
-    used, renumbered = np.unique(triangles, return_inverse=True)
-    return RepairedSurface(points[used], renumbered.reshape(triangles.shape), tuple(remarks))
+    return RepairedSurface(*compact(points, triangles), tuple(remarks))
 
 
 def without_repeats(triangles: np.ndarray) -> np.ndarray:
@@ -84,9 +77,7 @@ def edge_pairs(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def part_of(triangles: np.ndarray) -> np.ndarray:
     """Number of the part of each triangle, (t,); triangles of a part are connected by edges."""
     pairs, _ = edge_pairs(triangles)
-    count = len(triangles)
-    graph = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(count, count))
-    return connected_components(graph, directed=False)[1]
+    return connected(pairs, len(triangles))
 
 
 def largest(points: np.ndarray, triangles: np.ndarray, parts: np.ndarray) -> int:
@@ -100,9 +91,7 @@ def largest(points: np.ndarray, triangles: np.ndarray, parts: np.ndarray) -> int
 def largest_part(points: np.ndarray, triangles: np.ndarray) -> Surface:
     """The part with the largest bounding box: its points (m, 3) and triangles (s, 3)."""
     parts = part_of(triangles)
-    kept = triangles[parts == largest(points, triangles, parts)]
-    used, renumbered = np.unique(kept, return_inverse=True)
-    return points[used], renumbered.reshape(kept.shape)
+    return compact(points, triangles[parts == largest(points, triangles, parts)])
 
 
 def oriented(triangles: np.ndarray, name: str) -> tuple[np.ndarray, int]:
@@ -116,9 +105,7 @@ def oriented(triangles: np.ndarray, name: str) -> tuple[np.ndarray, int]:
     a, b = pairs.T
     other = np.where(opposite, b, b + count)
     mirrored = np.where(opposite, b + count, b)
-    ends = np.concatenate([a, a + count]), np.concatenate([other, mirrored])
-    graph = coo_array((np.ones(len(ends[0])), ends), shape=(2 * count, 2 * count))
-    label = connected_components(graph, directed=False)[1]
+    label = connected(np.column_stack([np.concatenate([a, a + count]), np.concatenate([other, mirrored])]), 2 * count)
     if (label[:count] == label[count:]).any():
         raise StudyError(f"{name}: the surface has only one side, like a Moebius band; export it again")
     turn = label[:count] != label[:1]
@@ -141,14 +128,8 @@ def without_holes(points: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray
     if not len(open_edges):
         return points, triangles, 0
     nodes, local = np.unique(open_edges, return_inverse=True)
-    i, j = local.reshape(-1, 2).T
-    graph = coo_array((np.ones(len(i)), (i, j)), shape=(len(nodes), len(nodes)))
-    count, loop = connected_components(graph, directed=False)
+    loop = connected(local.reshape(-1, 2), len(nodes))
+    count = int(loop.max()) + 1
     middles = np.stack([points[nodes[loop == k]].mean(axis=0) for k in range(count)])
-    fans = np.column_stack([open_edges[:, ::-1], len(points) + loop[i]])
+    fans = np.column_stack([open_edges[:, ::-1], len(points) + loop[local.reshape(-1, 2)[:, 0]]])
     return np.vstack([points, middles]), np.vstack([triangles, fans]), count
-
-
-def flat_triangles(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Indices of the triangles whose radius ratio is below SLIVER, so that their normal is unusable."""
-    return np.flatnonzero(triangle_radius_ratio(points, triangles) < SLIVER)

@@ -5,13 +5,11 @@ from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import KDTree
 
 from massspring.body.surface import winding_number
 from studies.base.errors import StudyError
-from studies.geometry.mesh.organ_mesh import triangle_normals
+from studies.geometry.mesh.organ_mesh import Surface, connected, triangle_normals
 from studies.geometry.shape.regions import BallRegion, HalfSpace, Region
 
 LEAST_PIECE = 0.01
@@ -79,8 +77,7 @@ def sheet_of(plane: HalfSpace, points: np.ndarray, triangles: np.ndarray) -> She
 def _pieces(points: np.ndarray, triangles: np.ndarray, plane: HalfSpace) -> list[tuple[np.ndarray, float]]:
     """Nodes and volume [m³] of each piece on one side of a plane, bounded by triangles (t, 3) and their section."""
     pairs = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]]])
-    graph = coo_array((np.ones(len(pairs)), pairs.T), shape=(len(points), len(points)))
-    label = connected_components(graph, directed=False)[1][triangles[:, 0]]
+    label = connected(pairs, len(points))[triangles[:, 0]]
     # With the origin in the plane the section contributes no volume.
     a, b, c = (points - np.asarray(plane.point))[triangles].transpose(1, 0, 2)
     volume = np.einsum("ij,ij->i", a, np.cross(b, c)) / 6.0
@@ -94,7 +91,7 @@ def _pieces(points: np.ndarray, triangles: np.ndarray, plane: HalfSpace) -> list
 def check_sheet(
     name: str,
     cut: str,
-    surface: tuple[np.ndarray, np.ndarray],
+    surface: Surface,
     plane: HalfSpace,
     within: Region | None,
     held: Iterable[Region],
@@ -149,7 +146,7 @@ def check_apart(name: str, sheets: Mapping[str, tuple[HalfSpace, Sheet]], edge: 
 def _check_disc(
     name: str,
     cut: str,
-    surface: tuple[np.ndarray, np.ndarray],
+    surface: Surface,
     sheet: Sheet,
     plane: HalfSpace,
     within: BallRegion,

@@ -5,7 +5,7 @@ from functools import cache
 
 import numpy as np
 
-from studies.geometry.mesh.organ_mesh import triangle_areas, unique_edges
+from studies.geometry.mesh.organ_mesh import counted_edges, triangle_areas, unique_edges
 from studies.geometry.shape.levelset import Shape, project
 from studies.geometry.shape.regions import Region
 
@@ -39,8 +39,7 @@ def region_area(region: Region, points: np.ndarray, triangles: np.ndarray) -> fl
 def outline_edges(points: np.ndarray, triangles: np.ndarray, region: Region) -> np.ndarray:
     """Edges (e, 2), lower index first, between one of the triangles (t, 3) inside the region and one outside."""
     inside = (region_side(region, points) <= 0)[triangles].all(axis=1)
-    half = np.sort(triangles[inside][:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-    edges, count = np.unique(half, axis=0, return_counts=True)
+    edges, count = counted_edges(triangles[inside])
     return edges[count == 1]
 
 
