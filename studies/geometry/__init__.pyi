@@ -5,7 +5,6 @@ from .api.organs import curved as curved
 from .api.organs import fill as fill
 from .api.organs import liver as liver
 from .api.organs import organ as organ
-from .api.organs import organ_family as organ_family
 from .api.scans import painted as painted
 from .api.scans import scan as scan
 from .api.scans import true_shape_of as true_shape_of
@@ -23,7 +22,6 @@ from .organs.liver import LIVER_PRESS_DIRECTION as LIVER_PRESS_DIRECTION
 from .organs.liver import LIVER_PROBE_NORMAL as LIVER_PROBE_NORMAL
 from .organs.liver import LIVER_PROBE_POINT as LIVER_PROBE_POINT
 from .organs.liver import LIVER_REGIONS as LIVER_REGIONS
-from .organs.liver import project_liver as project_liver
 from .organs.spleen import SPLEEN_REGIONS as SPLEEN_REGIONS
 from .organs.stomach import STOMACH_REGIONS as STOMACH_REGIONS
 from .shape.regions import BallRegion as BallRegion

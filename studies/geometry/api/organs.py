@@ -3,7 +3,6 @@
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -68,23 +67,6 @@ def organ(
             raise StudyError(f"{name}: {layers} layers asked for, but it is solid; only a hollow organ has layers")
         recipe["layers"] = int(layers)
     return mesh_from(recipe)
-
-
-def organ_family(
-    name: str,
-    sizes: Sequence[int],
-    regions: Mapping[str, Region] | None = None,
-    fill: bool = True,
-    parameters: Mapping[str, Any] | None = None,
-    layers: int | None = None,
-) -> list[OrganMesh]:
-    """Meshes of one shape with the same attachments and `sizes` nodes on the outer surface, coarsest first.
-
-    The other arguments are those of `organ`. Raises StudyError as `organ` does, and for sizes that do not increase.
-    """
-    if any(b <= a for a, b in pairwise(sizes)):
-        raise StudyError(f"{name}: a family of meshes needs growing node counts, not {list(sizes)}")
-    return [organ(name, nodes, regions, fill, parameters, layers) for nodes in sizes]
 
 
 def curved(mesh: OrganMesh, may_fold: bool = False, shape: Shape | None = None) -> CurvedMesh:

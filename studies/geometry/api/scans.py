@@ -26,7 +26,7 @@ from studies.geometry.files.units import (
 )
 from studies.geometry.mesh.checks import check_finite, check_one_part, check_surface, check_volume
 from studies.geometry.mesh.organ_mesh import OrganMesh, boundary_triangles, signed_volume
-from studies.geometry.mesher.jobs import level_of, mesh_from
+from studies.geometry.mesher.jobs import LEVEL, TIME_LIMIT, cached, mesh_from, run_worker
 from studies.geometry.scanned.fidelity import warnings_of
 from studies.geometry.scanned.level_grid import grid_from, shape_of
 from studies.geometry.shape.levelset import Shape
@@ -159,7 +159,8 @@ def true_shape_of(source: Source, **how: Any) -> Shape:
 def level_arrays(recipe: Mapping[str, Any], surface: RepairedSurface) -> dict[str, np.ndarray]:
     """The grid of the true shape of a repaired surface (jobs.LEVEL); recipe: of a scan."""
     deciding = {key: recipe[key] for key in LEVEL_KEYS if key in recipe} | {"kind": "level"}
-    return level_of(deciding, {"points": surface.points, "triangles": surface.triangles})
+    given = {"points": surface.points, "triangles": surface.triangles}
+    return cached(deciding, given, LEVEL, lambda: run_worker(deciding, given, TIME_LIMIT))
 
 
 def repaired_surface(source: Source, content: Content, remeshing: Remeshing) -> tuple[RepairedSurface, dict[str, Any]]:

@@ -61,11 +61,8 @@ def examine(
     repeats = file.path.suffix.lower() == ".stl"
     welding = describe_welding(content.points, content.cells, repeats)
     points, cells = content.points, content.cells
-    welding["part_list"] = []
     if not welding["bad_points"]:
-        for part in parts_in(content):
-            row = {"number": part.number, "name": part.name, "triangles": part.triangles}
-            welding["part_list"].append(row | {"size": [metres * side for side in part.size]})
+        welding["part_list"] = parts_in(content, metres)
         points, cells = weld(points, cells)
     return examine_cells(file.path.name, points * metres, cells, used | welding, tissue)
 

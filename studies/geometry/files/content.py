@@ -2,6 +2,7 @@
 file has names, else by connectivity."""
 
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from scipy.spatial import KDTree
@@ -61,10 +62,8 @@ class Content:
 
 
 def check_content(content: Content, name: str) -> Content:
-    """The content unchanged; name: of the file.
-
-    Raises StudyError unless it has cells, all their points exist, and points have three coordinates.
-    """
+    """The content unchanged. Raises StudyError unless it has cells, all their points exist, and points have three
+    coordinates; name: of the file."""
     points = content.points
     if not points.size:
         raise StudyError(f"{name}: the file has no points; export a surface or a volume mesh")
@@ -88,38 +87,22 @@ def fans(polygons: np.ndarray) -> np.ndarray:
     ).reshape(-1, 3)
 
 
-@dataclass(frozen=True)
-class Part:
-    """One body of a file."""
-
-    number: int
-    """From 1: in the order of the file if parts have names, else the largest box first."""
-    name: str
-    triangles: int
-    size: tuple[float, float, float]
-    """Sides of its box in the unit of the file."""
-
-
-def parts_in(content: Content) -> list[Part]:
-    """The parts of a surface; none without triangles.
-
-    The triangles are one part if the file has tetrahedra, or if a coordinate is not finite.
-    """
+def parts_in(content: Content, metres: float) -> list[dict[str, Any]]:
+    """Number, name, triangles and sides of the box [m] of each part of a surface, JSON-able; metres: per unit of the
+    file. The triangles are one part if the file has tetrahedra, or if a coordinate is not finite."""
     numbers, names = numbered(content)
-    parts = []
+    rows = []
     for k in range(int(numbers.max(initial=-1)) + 1):
-        rows = content.triangles[numbers == k]
-        size = np.ptp(content.points[np.unique(rows)], axis=0) if len(rows) else np.zeros(3)
-        sides = float(size[0]), float(size[1]), float(size[2])
-        parts.append(Part(k + 1, names[k] if names else "", len(rows), sides))
-    return parts
+        own = content.triangles[numbers == k]
+        size = np.ptp(content.points[np.unique(own)], axis=0) if len(own) else np.zeros(3)
+        row = {"number": k + 1, "name": names[k] if names else "", "triangles": len(own)}
+        rows.append(row | {"size": [metres * side for side in size.tolist()]})
+    return rows
 
 
 def chosen(content: Content, part: str | None, name: str) -> Content:
-    """The content reduced to `part`, given by name or number; None: all of it. name: of the file.
-
-    Raises StudyError for an unknown part, and for a part of a body of tetrahedra.
-    """
+    """The content reduced to `part`, given by name or number; None: all of it. Raises StudyError for an unknown part,
+    and for a part of a body of tetrahedra; name: of the file."""
     if part is None:
         return content
     if len(content.tetrahedra):
@@ -142,10 +125,8 @@ def listed(names: tuple[str, ...], count: int) -> str:
 
 
 def numbered(content: Content) -> tuple[np.ndarray, tuple[str, ...]]:
-    """The number of the part of each triangle from 0, (t,), and the names of the parts.
-
-    Without names in the file the parts are the connected ones, the one with the largest box first.
-    """
+    """The number of the part of each triangle from 0, (t,), and the names of the parts; without names the parts are the
+    connected ones, the one with the largest box first."""
     if content.names:
         return content.part, content.names
     finite = np.isfinite(content.points).all()
@@ -163,10 +144,8 @@ def numbered(content: Content) -> tuple[np.ndarray, tuple[str, ...]]:
 
 
 def coincident(points: np.ndarray) -> np.ndarray:
-    """For each point (n, 3) the index of the first point that coincides with it, (n,).
-
-    Points coincide if they are within WELD of the diagonal, or if a chain of such points joins them.
-    """
+    """For each point (n, 3) the index of the first one that coincides with it, (n,): within WELD of the diagonal, or
+    joined by a chain of such points."""
     reach = WELD * float(np.linalg.norm(np.ptp(points, axis=0)))
     label = connected(KDTree(points).query_pairs(reach, output_type="ndarray"), len(points))
     _, first = np.unique(label, return_index=True)

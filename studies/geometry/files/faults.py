@@ -115,6 +115,8 @@ def unreadable(path: Path, reason: str) -> StudyError:
 
 def reason_of(path: Path, error: BaseException, output: str) -> str:
     """Why a reader failed on a file: from the file, else from the `output` of the reader, else from its error."""
+    if isinstance(error, PermissionError):
+        return "it may not be read: change its permissions"
     with open(path, "rb") as file:
         is_text_stl = path.suffix.lower() == ".stl" and is_ascii_stl(file.read(HEAD))
     end = b"endsolid" if is_text_stl else ENDS.get(path.suffix.lower())
@@ -131,7 +133,6 @@ WORDS: tuple[tuple[tuple[type[BaseException], ...], str], ...] = (
     ((UnicodeError,), "it contains binary data where text is expected"),
     ((ParseError,), "its XML is truncated or damaged"),
     ((EOFError, struct.error, zlib.error, gzip.BadGzipFile, lzma.LZMAError), "it is cut short, or damaged"),
-    ((PermissionError,), "it may not be read: change its permissions"),
     ((FileNotFoundError,), "a file that belongs to it is missing from its folder"),
     ((IndexError, KeyError), "it is truncated or refers to missing data"),
     ((ValueError, AssertionError), "a number in it is malformed or missing"),

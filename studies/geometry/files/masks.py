@@ -85,10 +85,8 @@ def load_nifti(path: Path) -> Mask:
 
 
 def load_nrrd(path: Path) -> Mask:
-    """An NRRD image as a mask, with the names of the segments of 3D Slicer.
-
-    Raises StudyError if it is no mask, if its axes have no directions in space, or if pynrrd is not installed.
-    """
+    """An NRRD image as a mask, with the names of the segments of 3D Slicer. Raises StudyError if it is no mask, if its
+    axes have no directions in space, or if pynrrd is not installed."""
     try:
         import nrrd
     except ImportError as error:
@@ -144,10 +142,8 @@ def no_mask(name: str, why: str) -> StudyError:
 
 
 def check_labels(labels: np.ndarray, count: int, name: str) -> None:
-    """Raise StudyError for an image of grey values: many values, or labelled neighbours that mostly differ.
-
-    count: number of different labels.
-    """
+    """Raise StudyError for an image of grey values: many values (`count` different ones), or labelled neighbours that
+    mostly differ."""
     if labels.min() < -1:
         raise no_mask(name, f"down to {int(labels.min()):,}")
     if count > MOST_LABELS:
@@ -197,9 +193,7 @@ def listed(mask: Mask, voxels: dict[int, int]) -> str:
 
 def label_surface(mask: Mask, label: int) -> tuple[np.ndarray, np.ndarray, bool]:
     """Points (n, 3) in the unit of the file and outward triangles (t, 3) around a label; whether the image cuts it off.
-
-    The label is blurred by BLUR voxels. The surface is the level that has as many voxels inside as the label.
-    """
+    The label is blurred by BLUR voxels; the surface is the level that has as many voxels inside as the label."""
     from skimage.measure import marching_cubes  # loads slowly, and few files need it
 
     inside = mask.labels == label

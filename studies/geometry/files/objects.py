@@ -17,10 +17,8 @@ OBJECT = re.compile(rb"^o[ \t]+(\S.*?)\s*$", re.MULTILINE)
 
 
 def read_objects(path: Path) -> Content:
-    """All triangles of a file. Each object has its transformation applied and is a part, if there are several.
-
-    Khronos Group: glTF 2.0 specification, 2021. Raises any exception of trimesh for a broken file.
-    """
+    """All triangles of a file. Each object has its transformation applied and is a part, if there are several (Khronos
+    Group: glTF 2.0 specification, 2021). Raises any exception of trimesh for a broken file."""
     scene = scene_of(path)
     points, triangles, part, names = [np.empty((0, 3))], [np.empty((0, 3), np.int64)], [np.empty(0, np.int64)], []
     count = 0
@@ -66,10 +64,8 @@ def in_order(scene: Any, path: Path) -> list[str]:
 
 
 def counted_from_one(text: bytes) -> bytes:
-    """The text of an OBJ whose faces count points from the first one; negative numbers, which count back, are replaced.
-
-    Faces then lose their numbers of texture coordinates and normals.
-    """
+    """The text of an OBJ whose faces count points from the first one, without texture coordinates and normals, where
+    negative numbers count back; else the text unchanged."""
     if not re.search(rb"^f\b.*-\d", text, re.MULTILINE):
         return text
     lines, points = [], 0

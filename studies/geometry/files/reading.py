@@ -68,14 +68,10 @@ def marked_nodes(content: Content) -> dict[str, np.ndarray]:
 
 def warn_about_unit(points: np.ndarray, name: str) -> None:
     box = np.ptp(points, axis=0) if len(points) else np.zeros(3)
-    if box.max() > LARGEST:
-        sides = " x ".join(f"{side:.4g}" for side in box)
-        warnings.warn(
-            f"{name}: the bounding box is {sides} m; if the file is in millimetres, say unit='mm'", stacklevel=3
-        )
-    elif 0 < box.max() < SMALLEST:
-        sides = " x ".join(f"{side:.4g}" for side in box)
-        warnings.warn(f"{name}: the bounding box is {sides} m; if the file is in metres, say unit='m'", stacklevel=3)
+    sides = " x ".join(f"{side:.4g}" for side in box)
+    if box.max() > LARGEST or 0 < box.max() < SMALLEST:
+        unit = "millimetres, say unit='mm'" if box.max() > LARGEST else "metres, say unit='m'"
+        warnings.warn(f"{name}: the bounding box is {sides} m; if the file is in {unit}", stacklevel=3)
 
 
 def weld(points: np.ndarray, cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

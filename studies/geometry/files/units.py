@@ -60,8 +60,8 @@ class Source:
     def metres(self, side: float, header_unit: str | None) -> float:
         """Metres per unit of the file, including the scale.
 
-        side: longest side in the unit of the file; header_unit: the unit that the file states, or None. Raises
-        StudyError if the user has to give the unit.
+        side: longest side in the unit of the file; header_unit: the one that it states. Raises StudyError if the user
+        has to give the unit.
         """
         if self.longest_side is not None:
             return self.longest_side / side if side > 0 else 1.0
@@ -105,15 +105,11 @@ def check_unit(unit: str) -> None:
 def check_range(side: float, name: str, low: float = ABSURD[1], high: float = ABSURD[0]) -> None:
     """Raise StudyError for a longest side [m] outside `low` to `high`; 0 and NaN pass, because other checks report
     them."""
-    if side > high:
+    if side > high or 0 < side < low:
+        limit = f"larger than {LARGEST:g} m" if side > high else f"smaller than {1e3 * SMALLEST:g} mm"
         raise StudyError(
-            f"{name}: the longest side is {side:.3g} m; no organ is larger than {LARGEST:g} m: correct the unit or the "
-            "scale, or export the file again"
-        )
-    if 0 < side < low:
-        raise StudyError(
-            f"{name}: the longest side is {side:.3g} m; no organ is smaller than {1e3 * SMALLEST:g} mm: correct the "
-            "unit or the scale, or export the file again"
+            f"{name}: the longest side is {side:.3g} m; no organ is {limit}: correct the unit or the scale, or export "
+            "the file again"
         )
 
 
@@ -131,20 +127,15 @@ def likely_units(side: float) -> list[str]:
 
 
 def unit_question(name: str, side: float) -> str:
-    """A question to the user for the unit of a file whose longest side is `side`, with the possible answers."""
-    likely = likely_units(side)
-    if likely:
-        guess = " or ".join(NAMES[unit] for unit in likely)
-        return f"{name} does not say its unit; its longest side is {side:.4g}, the size of an organ in {guess}"
-    return f"{name} does not say its unit; its longest side is {side:.4g}, not a plausible organ size in m, cm or mm"
+    """A question for the unit of a file whose longest side is `side`, with the possible answers."""
+    guess = " or ".join(NAMES[unit] for unit in likely_units(side))
+    what = f"the size of an organ in {guess}" if guess else "not a plausible organ size in m, cm or mm"
+    return f"{name} does not say its unit; its longest side is {side:.4g}, {what}"
 
 
 def settled_unit(name: str, side: float, unit: str | None) -> str:
-    """`unit` if it is given, else "m" if only metres give the size of an organ.
-
-    side: longest side in the unit of the file, scaled. Raises StudyError for an unknown unit, and if the user has to
-    give the unit.
-    """
+    """`unit` if it is given, else "m" if only metres give the size of an organ; side: longest side in the unit of the
+    file, scaled. Raises StudyError for an unknown unit, and if the user has to give it."""
     if unit is not None:
         check_unit(unit)
         return unit

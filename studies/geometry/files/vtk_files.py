@@ -89,10 +89,8 @@ class Legacy:
 
 
 def read_legacy(path: Path) -> tuple[np.ndarray, Triangles]:
-    """Points (n, 3) and triangles (t, 3) of a legacy file; polygons and strips are cut into triangles.
-
-    Raises ReadError for a file that is cut short or has numbers of an unknown type.
-    """
+    """Points (n, 3) and triangles (t, 3) of a legacy file; polygons and strips are cut into triangles. Raises ReadError
+    for a file that is cut short or has numbers of an unknown type."""
     text = Legacy(path.read_bytes())
     points, triangles = np.empty((0, 3)), [np.empty((0, 3), np.int64)]
     while words := text.words():
@@ -109,11 +107,8 @@ def read_legacy(path: Path) -> tuple[np.ndarray, Triangles]:
 
 
 def cells(text: Legacy, first: int, second: int) -> tuple[np.ndarray, np.ndarray]:
-    """Number of corners of each cell, and the corners of all cells in turn.
-
-    first, second: the two numbers in the line of the cells. Reads the old form, with counts among the corners, and that
-    of version 5.1, with OFFSETS and CONNECTIVITY.
-    """
+    """Number of corners of each of the `first` cells, and the corners of all cells in turn: in the old form, with
+    counts among the corners, and that of version 5.1, with OFFSETS and CONNECTIVITY."""
     start = text.at
     words = text.words()
     if words and words[0].upper() == b"OFFSETS":
@@ -194,11 +189,9 @@ def with_arrays(data: bytes) -> bytes:
 
 
 def block(blob: bytes, at: int, size: np.dtype, packed: bool) -> tuple[bytes, bytes]:
-    """Header and body of the array at byte `at` of the appended data `blob`.
-
-    The header is the length of the array, or of a packed one the number and the lengths of its blocks, in numbers of
-    the type `size`. Raises ReadError if the file ends before.
-    """
+    """Header and body of the array at byte `at` of the appended data `blob`. The header is the length of the array, or
+    of a packed one the number and the lengths of its blocks, as numbers of the type `size`. Raises ReadError if the
+    file ends before."""
 
     def number(k: int) -> int:
         values = blob[at + k * size.itemsize : at + (k + 1) * size.itemsize]

@@ -50,7 +50,7 @@ def write_mesh(mesh: OrganMesh, path: Path, unit: str = "m", curved: CurvedMesh 
     check_unit(unit)
     if curved is not None and not holds_tetrahedra(path):
         raise StudyError(f"{path.name}: {path.suffix} holds flat triangles only; write a curved mesh as .vtu")
-    written = curved_cells(mesh, curved) if curved is not None else straight_cells(mesh, holds_tetrahedra(path))
+    written = cells_of(mesh, curved, holds_tetrahedra(path))
     written.points = written.points / UNITS[unit]
     if path.suffix.lower() in (".stl", ".obj", ".off"):
         written.point_data, written.cell_data = {}, {}
@@ -62,54 +62,28 @@ def write_mesh(mesh: OrganMesh, path: Path, unit: str = "m", curved: CurvedMesh 
         # meshio cannot read back integers, nor the text form that it writes: hence floats, and the binary form.
         patches: dict[str, Any] = {name: np.asarray(values, float) for name, values in written.point_data.items()}
         written.point_data = patches
-    data = content(written, path.suffix.lower())
-    write_whole(path, with_losses(data, mesh.losses) if path.suffix.lower() == ".vtu" and mesh.losses else data)
+    write_whole(path, content(written, path.suffix.lower()))
 
 
-def with_losses(data: bytes, losses: dict[str, Any]) -> bytes:
-    """The bytes of a VTU file with the losses of the mesh (OrganMesh.losses) as field data, in SI units."""
-    numbers: dict[str, list[float]] = {}
-    for key, value in losses.items():
-        if isinstance(value, dict):
-            numbers |= {f"{key}_{name}": np.ravel(part).tolist() for name, part in value.items()}
-        else:
-            numbers[key] = [float(value)]
-    arrays = "".join(
-        f'<DataArray type="Float64" Name="{name}" NumberOfTuples="{len(values)}" format="ascii">'
-        f"{' '.join(map(repr, values))}</DataArray>\n"
-        for name, values in numbers.items()
-    )
-    tag = b"<UnstructuredGrid>"
-    return data.replace(tag, tag + f"<FieldData>\n{arrays}</FieldData>\n".encode(), 1)
-
-
-def straight_cells(mesh: OrganMesh, tetrahedra: bool) -> meshio.Mesh:
-    """Boundary triangles, and tetrahedra if `tetrahedra` is set and there are any, with patches and parts."""
-    with_cells = tetrahedra and len(mesh.tetrahedra) > 0
-    points = mesh.points if with_cells else mesh.points[: mesh.surface_count]
-    cells: list[Any] = [("triangle", mesh.triangles.astype(np.int32))]
-    outer = np.where((mesh.triangles < mesh.outer_count).all(axis=1), TAGS["outer"], TAGS["lumen"])
-    parts: list[Any] = [outer.astype(np.int32)]
-    if with_cells:
-        cells.append(("tetra", mesh.tetrahedra.astype(np.int32)))
-        parts.append(np.full(len(mesh.tetrahedra), TAGS["tissue"], np.int32))
-    return meshio.Mesh(points, cells, patch_data(mesh, len(points)), {"part": parts})
-
-
-def curved_cells(mesh: OrganMesh, curved: CurvedMesh) -> meshio.Mesh:
-    """Second-order tetrahedra; patches contain vertices only, no mid-side nodes."""
-    cells: list[Any] = [("tetra10", curved.cells.astype(np.int32))]
-    part = np.full(len(curved.cells), TAGS["tissue"], np.int32)
-    return meshio.Mesh(curved.points, cells, patch_data(mesh, len(curved.points)), {"part": [part]})
-
-
-def patch_data(mesh: OrganMesh, count: int) -> dict[str, Any]:
-    """1 at the nodes of each patch, 0 elsewhere, shape (count,)."""
+def cells_of(mesh: OrganMesh, curved: CurvedMesh | None, tetrahedra: bool) -> meshio.Mesh:
+    """The boundary triangles, and tetrahedra if `tetrahedra` is set and there are any, or those of second order alone;
+    with parts, and with patches, which contain no mid-side nodes."""
+    if curved is not None:
+        points, cells = curved.points, {"tetra10": curved.cells}
+        parts = [np.full(len(curved.cells), TAGS["tissue"], np.int32)]
+    else:
+        points, cells = mesh.points[: mesh.surface_count], {"triangle": mesh.triangles}
+        outer = (mesh.triangles < mesh.outer_count).all(axis=1)
+        parts = [np.where(outer, TAGS["outer"], TAGS["lumen"]).astype(np.int32)]
+        if tetrahedra and len(mesh.tetrahedra):
+            points, cells["tetra"] = mesh.points, mesh.tetrahedra
+            parts.append(np.full(len(mesh.tetrahedra), TAGS["tissue"], np.int32))
+    blocks: list[Any] = [(kind, nodes.astype(np.int32)) for kind, nodes in cells.items()]
     data: dict[str, Any] = {}
     for name, nodes in mesh.patches.items():
-        data[PATCH + name] = np.zeros(count, np.int32)
+        data[PATCH + name] = np.zeros(len(points), np.int32)
         data[PATCH + name][nodes] = 1
-    return data
+    return meshio.Mesh(points, blocks, data, {"part": parts})
 
 
 def content(mesh: meshio.Mesh, suffix: str) -> bytes:

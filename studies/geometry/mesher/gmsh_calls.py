@@ -121,8 +121,13 @@ def fill_once(
         loop = gmsh.model.geo.addSurfaceLoop([surface])
         gmsh.model.geo.addVolume([loop])
         gmsh.model.geo.synchronize()
-        if graded:
-            grow_inwards(surface, points)
+        if graded:  # from the size of the facets to an eighth of the smallest extent of the body
+            extent, field = float(np.ptp(points, axis=0).min()), gmsh.model.mesh.field.add("Extend")
+            gmsh.model.mesh.field.setNumbers(field, "SurfacesList", [surface])
+            gmsh.model.mesh.field.setNumber(field, "DistMax", extent / 2.0)
+            gmsh.model.mesh.field.setNumber(field, "SizeMax", extent / 8.0)
+            gmsh.model.mesh.field.setAsBackgroundMesh(field)
+            gmsh.option.setNumber("Mesh.MeshSizeExtendFromBoundary", 0)
         gmsh.model.mesh.generate(3)
         tags, all_points, tetrahedra = read_elements(TETRAHEDRON)
     count = len(points)
@@ -131,17 +136,6 @@ def fill_once(
     if (all_points[:count] != points).any() or not same_triangles(boundary_triangles(tetrahedra), triangles):
         raise StudyError("gmsh changed the surface when filling it; repair the surface first")
     return all_points, turn_inverted(all_points, tetrahedra)
-
-
-def grow_inwards(surface: int, points: np.ndarray) -> None:
-    """Lets elements grow inwards from the size of the facets to an eighth of the smallest extent of the body."""
-    extent = float(np.ptp(points, axis=0).min())
-    field = gmsh.model.mesh.field.add("Extend")
-    gmsh.model.mesh.field.setNumbers(field, "SurfacesList", [surface])
-    gmsh.model.mesh.field.setNumber(field, "DistMax", extent / 2.0)
-    gmsh.model.mesh.field.setNumber(field, "SizeMax", extent / 8.0)
-    gmsh.model.mesh.field.setAsBackgroundMesh(field)
-    gmsh.option.setNumber("Mesh.MeshSizeExtendFromBoundary", 0)
 
 
 def fill_surface(points: np.ndarray, triangles: np.ndarray, strict: bool = True) -> tuple[np.ndarray, np.ndarray]:
@@ -204,5 +198,5 @@ def build_octant(recipe: dict[str, Any], arrays: dict[str, np.ndarray]) -> dict[
     on_sphere = np.abs(distance - 1.0) < 1e-9
     points[on_sphere] /= distance[on_sphere][:, None]
     points, triangles, tetrahedra, count = surface_first(radius * points, turn_inverted(points, tetrahedra))
-    cells = {"triangles": triangles, "tetrahedra": tetrahedra}
-    return {"points": points, **cells, "surface_count": np.array(count), "outer_count": np.array(count)}
+    counts = {"surface_count": np.array(count), "outer_count": np.array(count)}
+    return {"points": points, "triangles": triangles, "tetrahedra": tetrahedra, **counts}

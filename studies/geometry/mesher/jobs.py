@@ -45,15 +45,21 @@ MAKERS = ("studies.geometry.mesher.organ_recipe", *dict.fromkeys(MADE_ELSEWHERE.
 def mesh_from(
     recipe: dict[str, Any], arrays: dict[str, np.ndarray] | None = None, limit: float = TIME_LIMIT
 ) -> OrganMesh:
-    """The mesh of a JSON-able recipe and the arrays that it needs, cached.
-
-    limit: processor time of the worker [s]. Raises StudyError if the mesh cannot be made or stored, and for a region
-    without nodes.
-    """
-    given = arrays or {}
-    parts = (*PARTS, "losses") if recipe["kind"] == "scan" else PARTS
-    parts = (*parts, *cuts_of(recipe))
-    return to_mesh(recipe, cached(recipe, given, parts, lambda: run_worker(recipe, given | surface_of(recipe), limit)))
+    """The mesh of a JSON-able recipe and the arrays that it needs, cached; limit: processor time [s]. Raises StudyError
+    if it cannot be made or stored, and for a region without nodes."""
+    given, cuts = arrays or {}, cuts_of(recipe)
+    parts = (*PARTS, *(("losses",) if recipe["kind"] == "scan" else ()), *cuts)
+    made = cached(recipe, given, parts, lambda: run_worker(recipe, given | surface_of(recipe), limit))
+    mesh = OrganMesh(
+        recipe["name"],
+        *(made[part] for part in ("points", "triangles", "tetrahedra")),
+        int(made["surface_count"]),
+        recipe=recipe,
+        outer_count=int(made["outer_count"]),
+        losses=json.loads(str(made["losses"])) if "losses" in made else {},
+        cuts={cut["name"]: made[part] for part, cut in cuts.items()},
+    )
+    return replace(mesh, patches=patches_of(mesh, recipe.get("regions", {})))
 
 
 def surface_of(recipe: dict[str, Any]) -> dict[str, np.ndarray]:
@@ -71,14 +77,6 @@ def cuts_of(recipe: dict[str, Any]) -> dict[str, dict[str, Any]]:
     return {f"cut_faces{k or ''}": cut for k, cut in enumerate(cuts)}
 
 
-def level_of(recipe: dict[str, Any], arrays: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """The grid of the true shape of a scan, whose surface is `arrays`, cached; the names are those of LEVEL.
-
-    Raises StudyError if it cannot be made or stored.
-    """
-    return cached(recipe, arrays, LEVEL, lambda: run_worker(recipe, arrays, TIME_LIMIT))
-
-
 def cached(
     recipe: dict[str, Any],
     arrays: dict[str, np.ndarray],
@@ -93,20 +91,6 @@ def cached(
         result = make()
         write_cached(path, result)
     return result
-
-
-def to_mesh(recipe: dict[str, Any], arrays: dict[str, np.ndarray]) -> OrganMesh:
-    """The mesh from the arrays of a recipe, with its patches, cuts and losses.
-
-    Raises StudyError for a region without nodes.
-    """
-    count, outer = int(arrays["surface_count"]), int(arrays["outer_count"])
-    cells = arrays["triangles"], arrays["tetrahedra"]
-    losses = json.loads(str(arrays["losses"])) if "losses" in arrays else {}
-    points = arrays["points"]
-    mesh = OrganMesh(recipe["name"], points, *cells, count, recipe=recipe, outer_count=outer, losses=losses)
-    mesh = replace(mesh, cuts={cut["name"]: arrays[part] for part, cut in cuts_of(recipe).items()})
-    return replace(mesh, patches=patches_of(mesh, recipe.get("regions", {})))
 
 
 def patches_of(mesh: OrganMesh, regions: dict[str, dict[str, Any]]) -> dict[str, np.ndarray]:
@@ -173,10 +157,8 @@ def read_cached(path: Path, parts: tuple[str, ...]) -> dict[str, np.ndarray] | N
 
 
 def write_cached(path: Path, arrays: dict[str, np.ndarray]) -> None:
-    """Stores arrays under a temporary name and renames the file, so that another process sees all of it or none.
-
-    Raises StudyError if it cannot be stored.
-    """
+    """Stores arrays under a temporary name and renames the file, so that another process sees all of it or none. Raises
+    StudyError if it cannot be stored."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.NamedTemporaryFile(dir=path.parent, prefix=path.stem, suffix=".part", delete=False) as part:

@@ -10,7 +10,7 @@ from studies.geometry.mesh.checks import check_surface
 from studies.geometry.mesh.wall_layers import fill_wall
 from studies.geometry.mesher.gmsh_calls import build_octant, fill_surface
 from studies.geometry.mesher.jobs import cuts_of
-from studies.geometry.mesher.organ_surface import close_surface, even_surface
+from studies.geometry.mesher.organ_surface import organ_surface
 from studies.geometry.mesher.process import Arrays, stage, work
 from studies.geometry.mesher.section import check_clear, cut_wall, fill_cut, plane_of, with_front
 from studies.geometry.organs import make_shape
@@ -22,48 +22,35 @@ from studies.geometry.surface.volume import with_volume
 
 
 def build(recipe: dict[str, Any], arrays: Arrays) -> Arrays:
-    """The arrays of jobs.PARTS for a recipe of kind "organ", "fill" or "ball_octant".
-
-    arrays: points and triangles of the surface to fill; for kind "organ" that of the same recipe without "fill", or
-    nothing. Raises StudyError if the mesh cannot be made.
-    """
+    """The arrays of jobs.PARTS for a recipe of kind "organ", "fill" or "ball_octant". arrays: points and triangles of
+    the surface to fill; for kind "organ" that of the same recipe without "fill", or nothing. Raises StudyError."""
     return {"organ": build_organ, "fill": build_fill, "ball_octant": build_octant}[recipe["kind"]](recipe, arrays)
 
 
 def build_organ(recipe: dict[str, Any], arrays: Arrays) -> Arrays:
-    """An organ of SHAPES with `nodes` surface nodes and the outlines of its regions, filled if the recipe says so."""
+    """An organ of SHAPES by the `nodes`, `regions`, `sides`, `exact`, cuts, `fill` and `layers` of a recipe.
+
+    With sides "straight" or "curved" nodes are placed so that sides of this kind follow the shape; without, they are
+    evenly spread.
+    """
     shape = make_shape(recipe["organ"], recipe["parameters"])
     if arrays:
         return finish(shape, arrays["points"], arrays["triangles"], recipe)
-    return mesh_shape(shape, recipe)
-
-
-def mesh_shape(shape: Shape, recipe: dict[str, Any]) -> Arrays:
-    """A mesh of any shape by the `nodes`, `regions`, `sides`, `exact`, cuts, `fill` and `layers` of a recipe.
-
-    It is hollow if the shape has a wall. With sides "straight" or "curved" nodes are placed so that sides of this kind
-    follow the shape; without, they are evenly spread.
-    """
     held = [region_from_dict(data) for data in recipe["regions"].values()]
-    cuts = cuts_of(recipe)
-    regions = held + [plane_of(cut) for cut in cuts.values()]
-    check_clear(shape, list(cuts.values()), held, recipe["nodes"])
-    if "sides" in recipe:
-        points, triangles = close_surface(shape, recipe["nodes"], regions, recipe["sides"] == "curved")
-    else:
-        points, triangles = even_surface(shape, recipe["nodes"], regions)
+    cuts = list(cuts_of(recipe).values())
+    regions = held + [plane_of(cut) for cut in cuts]
+    check_clear(shape, cuts, held, recipe["nodes"])
+    points, triangles = organ_surface(shape, recipe["nodes"], regions, recipe.get("sides"))
     if has_exact_volume(recipe):
         points = with_volume(points, triangles, enclosed_volume(shape, 2), shape.level, regions)
-    for cut in cuts.values():
+    for cut in cuts:
         points, triangles = with_front(shape, (points, triangles), cut)
     return finish(shape, points, triangles, recipe)
 
 
 def finish(shape: Shape, points: np.ndarray, triangles: np.ndarray, recipe: dict[str, Any]) -> Arrays:
-    """The arrays of a surface of the shape, filled if the recipe says so.
-
-    For a scan elements of lower quality are accepted, because its folds may not allow better ones.
-    """
+    """The arrays of a surface of the shape, filled if the recipe says so. For a scan elements of lower quality are
+    accepted, because its folds may not allow better ones."""
     check_surface(points, triangles, shape.name)
     stage("filling")
     if not recipe["fill"]:
@@ -71,7 +58,11 @@ def finish(shape: Shape, points: np.ndarray, triangles: np.ndarray, recipe: dict
     cuts = cuts_of(recipe)
     if shape.wall is not None:
         made = fill_wall(shape, points, triangles, recipe.get("layers"))
-        all_points = with_lumen_volume(shape, made[0], triangles) if has_exact_volume(recipe) else made[0]
+        all_points = made[0]
+        if has_exact_volume(recipe):
+            lumen, inner = slice(len(points), 2 * len(points)), at_depth(shape, shape.wall)
+            volume = enclosed_volume(inner, 1)
+            all_points[lumen] = with_volume(all_points[lumen], triangles, volume, inner.level)
         faces = {}
         for part, cut in cuts.items():
             all_points, faces[part] = cut_wall(shape, all_points, triangles, made[2], cut)
@@ -87,18 +78,6 @@ def finish(shape: Shape, points: np.ndarray, triangles: np.ndarray, recipe: dict
 def has_exact_volume(recipe: dict[str, Any]) -> bool:
     """Whether the mesh gets the volume of its shape, with nodes slightly off it: a scan, or an organ with `exact`."""
     return recipe["kind"] == "scan" or recipe.get("exact", False)
-
-
-def with_lumen_volume(shape: Shape, points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Points (n, 3) [m] of a wall, with the nodes of the lumen moved so that it has its true volume.
-
-    triangles (t, 3): of the outer surface.
-    """
-    count, inner = int(triangles.max()) + 1, at_depth(shape, shape.wall or 0.0)
-    points = points.copy()
-    lumen = points[count : 2 * count]
-    points[count : 2 * count] = with_volume(lumen, triangles, enclosed_volume(inner, 1), inner.level)
-    return points
 
 
 def build_fill(recipe: dict[str, Any], arrays: Arrays) -> Arrays:

@@ -45,16 +45,21 @@ class EvenRemesher:
         return compact(np.asarray(mesh.get_vertices(), float), np.asarray(mesh.get_triangles()))
 
 
-def close_surface(shape: Shape, nodes: int, regions: list[Region], curved: bool) -> Surface:
-    """A surface with `nodes` nodes that follows its shape, with the outline of every region on its edges.
+def organ_surface(shape: Shape, nodes: int, regions: list[Region], sides: str | None) -> Surface:
+    """A surface with `nodes` nodes and the outline of every region on its edges.
 
-    The nodes are even if that is near enough to the shape; else it is the nearest surface of those with spare nodes.
-    curved: the sides will be quadratic, with mid-side nodes on f = 0. Raises StudyError if none is well shaped.
+    sides: None: the nodes are evenly spread; "straight" or "curved", for quadratic sides with mid-side nodes on f = 0:
+    the nodes are even if that is near enough to the shape, else it is the nearest surface of those with spare nodes.
+    Raises StudyError if none is well shaped, or an outline does not fit.
     """
     truth = first_surface(shape)
     with fresh_model():
         remesher = Remesher(*truth)
-        best = Fit(shape, even(shape, nodes, regions, remesher, truth), regions, truth, curved)
+        surface = even(shape, nodes, regions, remesher, truth)
+        if sides is None:
+            return surface
+        curved = sides == "curved"
+        best = Fit(shape, surface, regions, truth, curved)
         badness = best.badness()
         for spare in SPARES:
             if badness <= 1.0:
@@ -69,15 +74,13 @@ def close_surface(shape: Shape, nodes: int, regions: list[Region], curved: bool)
 def follow(
     shape: Shape, nodes: int, regions: list[Region], remesher: Remesher, truth: Surface, curved: bool, spare: float
 ) -> Fit | None:
-    """A surface with the share `spare` of its nodes where its shape needs them.
-
-    None if no surface with `nodes` nodes is well shaped and has edges short enough for all regions.
-    """
+    """A surface with the share `spare` of its nodes where its shape needs them; None if none with `nodes` nodes is well
+    shaped and has edges short enough for all regions."""
     for finer in ([], regions):
         try:
-            base = base_surface(
-                shape, remesher, truth, max(FEWEST, nodes - min(round(spare * nodes), MOST_SPARE)), finer
-            )
+            remesher.finer_in(finer)  # edges half as long there
+            count = max(FEWEST, nodes - min(round(spare * nodes), MOST_SPARE))
+            base = relaxed(shape, *well_shaped(shape, truth, count, remesher))
             made = fitted(shape, base, nodes, regions, truth, curved)
         except StudyError:
             # No failure yet: shorter edges in the regions, another share or the even surface follow.
@@ -87,64 +90,34 @@ def follow(
     return None
 
 
-def base_surface(shape: Shape, remesher: Remesher, start: Surface, nodes: int, finer: list[Region]) -> Surface:
-    """An even surface with `nodes` nodes without outlines, with edges half as long in the regions `finer`.
-
-    remesher: of `start`, a fine surface. Raises StudyError if none is well shaped.
-    """
-    remesher.finer_in(finer)
-    points, triangles = well_shaped(shape, start, nodes, remesher)
-    fixed = np.zeros(len(points), bool)
-    return relax(shape, points, triangles, None, fixed, fixed), triangles
-
-
-def even_surface(shape: Shape, nodes: int, regions: list[Region]) -> Surface:
-    """An even surface with `nodes` nodes and the outline of every region on its edges. Raises StudyError as `even`."""
-    start = first_surface(shape)
-    with fresh_model():
-        return even(shape, nodes, regions, Remesher(*start), start)
-
-
 def even(shape: Shape, nodes: int, regions: list[Region], remesher: Remesher, start: Surface) -> Surface:
-    """An even surface with `nodes` nodes and the outline of every region on its edges.
-
-    remesher: of `start`, a fine surface. If edges are too long for a region, the surface is meshed again with edges
-    half as long in the regions. Raises StudyError if none is well shaped, or an outline does not fit.
-    """
+    """An even surface with `nodes` nodes and the outline of every region on its edges; remesher: of `start`, a fine
+    surface. If edges are too long for a region, it is meshed again with edges half as long in the regions. Raises
+    StudyError if none is well shaped, or an outline does not fit."""
     stage(f"a surface of {nodes} nodes")
     for region in regions:
         region.level(start[0][:1])  # an invalid region is refused here, not inside the mesher
-    surface = snap_if_it_fits(shape, *well_shaped(shape, start, nodes, remesher), regions)
-    if surface is None:
-        remesher.finer_in(regions)
-        surface = snap_all(shape, *surface_with(nodes, area_of(start), remesher.mesh, shape), regions)
-    return surface
-
-
-def area_of(surface: Surface) -> float:
-    return float(triangle_areas(*surface).sum())
+    first = well_shaped(shape, start, nodes, remesher)
+    try:
+        surface = outlined(shape, *relaxed(shape, *first), regions)
+        if all(is_met(region, *surface) for region in regions):
+            return surface
+    except StudyError:
+        pass  # no failure yet: the finer surface that follows fits, or raises the same error
+    remesher.finer_in(regions)
+    area = float(triangle_areas(*start).sum())
+    return outlined(shape, *relaxed(shape, *surface_with(nodes, area, remesher.mesh, shape)), regions)
 
 
 def well_shaped(shape: Shape, start: Surface, nodes: int, remesher: Remesher) -> Surface:
-    """An even surface of `nodes` nodes by the remesher of `start`, or by MMG from `start` if that fails.
-
-    Raises StudyError if both fail.
-    """
+    """An even surface of `nodes` nodes by the remesher of `start`, or by MMG from `start` if that fails. Raises
+    StudyError if both fail."""
+    area = float(triangle_areas(*start).sum())
     try:
-        return surface_with(nodes, area_of(start), remesher.mesh, shape)
+        return surface_with(nodes, area, remesher.mesh, shape)
     except StudyError:
         # No failure yet: MMG makes one, or raises the same kind of error.
-        return surface_with(nodes, area_of(start), EvenRemesher(*start, NEARNESS).mesh, shape)
-
-
-def snap_if_it_fits(shape: Shape, points: np.ndarray, triangles: np.ndarray, regions: list[Region]) -> Surface | None:
-    """The surface with its outlines, or None if its edges are too long for one of the regions."""
-    try:
-        surface = snap_all(shape, points, triangles, regions)
-    except StudyError:
-        # No failure yet: the finer surface that follows fits or raises the same error.
-        return None
-    return surface if all(is_met(region, *surface) for region in regions) else None
+        return surface_with(nodes, area, EvenRemesher(*start, NEARNESS).mesh, shape)
 
 
 def is_met(region: Region, points: np.ndarray, triangles: np.ndarray) -> bool:
@@ -152,8 +125,6 @@ def is_met(region: Region, points: np.ndarray, triangles: np.ndarray) -> bool:
     return bool(inside[triangles].all(axis=1).any())
 
 
-def snap_all(shape: Shape, points: np.ndarray, triangles: np.ndarray, regions: list[Region]) -> Surface:
-    """The surface after relaxation, with the outline of every region. Raises StudyError if an outline does not fit."""
+def relaxed(shape: Shape, points: np.ndarray, triangles: np.ndarray) -> Surface:
     fixed = np.zeros(len(points), bool)
-    points = relax(shape, points, triangles, None, fixed, fixed)
-    return outlined(shape, points, triangles, regions)
+    return relax(shape, points, triangles, None, fixed, fixed), triangles

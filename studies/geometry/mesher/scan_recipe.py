@@ -34,10 +34,7 @@ from studies.geometry.surface.volume import with_volume
 
 
 def build(recipe: dict[str, Any], arrays: Arrays) -> Arrays:
-    """The arrays for a recipe of kind "scan" (jobs.PARTS and losses) or "level" (jobs.LEVEL).
-
-    Raises StudyError if they cannot be made.
-    """
+    """The arrays for a recipe of kind "scan" (jobs.PARTS and losses) or "level" (jobs.LEVEL). Raises StudyError."""
     return {"scan": build_scan, "level": build_level}[recipe["kind"]](recipe, arrays)
 
 

@@ -33,9 +33,7 @@ FEWEST_CELLS = 30
 
 def check_clear(shape: Shape, cuts: list[dict[str, Any]], held: list[Region], nodes: int) -> None:
     """Raises StudyError for cuts that no mesh of the shape with so many surface nodes can have (surface/sheet.py).
-
-    held: regions whose outlines the cuts must not cross.
-    """
+    held: regions whose outlines the cuts must not cross."""
     if not cuts:
         return
     surface, sheets = first_surface(shape), {}
@@ -54,11 +52,8 @@ def plane_of(cut: dict[str, Any]) -> HalfSpace:
 
 
 def with_front(shape: Shape, surface: Surface, cut: dict[str, Any]) -> Surface:
-    """The surface with the two nodes of the trace that are nearest to a straight front moved exactly onto it.
-
-    The trace of the plane has to lie on edges. Raises StudyError unless the front meets the trace twice, at different
-    nodes.
-    """
+    """The surface with the two nodes of the trace that are nearest to a straight front moved exactly onto it; the trace
+    has to lie on edges. Raises StudyError unless the front meets the trace twice, at different nodes."""
     points, triangles = surface
     plane, within = plane_of(cut), _within(cut)
     edges = trace(plane, points, triangles, shape.size, cut["name"])
@@ -86,11 +81,10 @@ def _within(cut: dict[str, Any]) -> Region | None:
 
 
 def trace(plane: HalfSpace, points: np.ndarray, triangles: np.ndarray, size: float, name: str) -> np.ndarray:
-    """Edges (e, 2) of a surface that lie in the plane, between triangles on different sides of it.
-
-    size: of the box of the shape [m]; name: of the cut. Raises StudyError if the trace touches itself.
-    """
-    on, side = _on(plane, points, size), _side(plane, points, triangles, size)
+    """Edges (e, 2) of a surface that lie in the plane, between triangles on different sides of it; size: of the box of
+    the shape [m]. Raises StudyError if the trace of the cut `name` touches itself."""
+    on = np.abs(plane.level(points)) <= 10 * ON_CURVE * size
+    side = _side(plane, points, triangles, size)
     half = triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
     keys, inverse = np.unique(np.sort(half, axis=1), axis=0, return_inverse=True)
     sides = np.bincount(inverse.reshape(-1), weights=np.repeat(side, 3))
@@ -100,13 +94,9 @@ def trace(plane: HalfSpace, points: np.ndarray, triangles: np.ndarray, size: flo
     return edges
 
 
-def _on(plane: HalfSpace, points: np.ndarray, size: float) -> np.ndarray:
-    return np.abs(plane.level(points)) <= 10 * ON_CURVE * size
-
-
 def _side(plane: HalfSpace, points: np.ndarray, triangles: np.ndarray, size: float) -> np.ndarray:
     """Side of each triangle (t,): −1 behind the plane, 1 in front; for a triangle in the plane that of the body."""
-    flat = _on(plane, points, size)[triangles].all(axis=1)
+    flat = (np.abs(plane.level(points)) <= 10 * ON_CURVE * size)[triangles].all(axis=1)
     outward = triangle_normals(points, triangles) @ np.asarray(plane.normal, float)
     return np.where(np.where(flat, outward < 0, plane.level(points[triangles].mean(axis=1)) > 0), 1, -1)
 
@@ -114,10 +104,10 @@ def _side(plane: HalfSpace, points: np.ndarray, triangles: np.ndarray, size: flo
 def fill_cut(
     shape: Shape, surface: Surface, cuts: list[dict[str, Any]]
 ) -> tuple[np.ndarray, np.ndarray, list[np.ndarray]]:
-    """Fills a surface on both sides of each cut.
+    """Fills a surface on both sides of each cut: all points (n, 3) [m], those of the surface first, tetrahedra (k, 4),
+    and the faces (f, 3) of each blade, anticlockwise seen from in front of its plane.
 
-    Returns all points (n, 3) [m], those of the surface first, tetrahedra (k, 4), and the faces (f, 3) of each blade,
-    anticlockwise seen from in front of its plane. Raises StudyError for a piece that is too small or cannot be filled.
+    Raises StudyError for a piece that is too small or cannot be filled.
     """
     points, triangles = surface
     planes, sections, blades = [plane_of(cut) for cut in cuts], list[np.ndarray](), list[np.ndarray]()
@@ -163,11 +153,11 @@ def fill_cut(
 def cut_wall(
     shape: Shape, points: np.ndarray, triangles: np.ndarray, tetrahedra: np.ndarray, cut: dict[str, Any]
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Cuts a layered wall: its points (n (layers + 1), 3) [m] and the faces (f, 3) of the blade.
+    """Cuts a layered wall: its points (n (layers + 1), 3) [m], in the order of mesh/wall_layers.py, with those below
+    the trace moved into the plane, and the faces (f, 3) of the blade.
 
-    The points have the order of studies.geometry.mesh.wall_layers; those below the trace are moved into the plane. The
-    faces are sides of prisms, anticlockwise seen from in front of the plane. triangles (t, 3): of the outer surface.
-    Raises StudyError if the move flattens an element.
+    The faces are sides of prisms, anticlockwise seen from in front of the plane. triangles (t, 3): of the outer
+    surface. Raises StudyError if the move flattens an element.
     """
     plane, within = plane_of(cut), _within(cut)
     count = int(triangles.max()) + 1
@@ -247,7 +237,10 @@ def section(
         ends = np.flatnonzero(np.abs(within.level(points[nodes])) <= tiny)
         if len(ends) != 2:
             raise StudyError(f"{name}: its front meets the trace {len(ends)} times and not twice; move it")
-        front = _straight(points[nodes[ends[0]]], points[nodes[ends[1]]], step)
+        start, end = points[nodes[ends]]
+        count = max(2, round(float(np.linalg.norm(end - start)) / step))
+        share = np.arange(1, count)[:, None] / count
+        front = (1 - share) * start + share * end
         chain = np.concatenate([ends[:1], len(nodes) + np.arange(len(front)), ends[1:]])
     given = np.concatenate([points[nodes], front])
     flat, triangles = meshed((given - plane.point) @ axes.T, outlines, chain)
@@ -275,13 +268,6 @@ def loops(edges: np.ndarray) -> list[np.ndarray]:
         rings.append(np.array(loop[:-1]))
         left = [node for node in left if node not in loop]
     return rings
-
-
-def _straight(start: np.ndarray, end: np.ndarray, step: float) -> np.ndarray:
-    """Points (f, 3) [m] about `step` [m] apart between `start` and `end`, without these."""
-    count = max(2, round(float(np.linalg.norm(end - start)) / step))
-    share = np.arange(1, count)[:, None] / count
-    return (1 - share) * start + share * end
 
 
 def _rim(plane: HalfSpace, within: BallRegion, normal: np.ndarray, axes: np.ndarray, step: float) -> np.ndarray:

@@ -33,10 +33,8 @@ WIDEST = 0.3
 
 
 def make_shape(name: str, parameters: Mapping[str, Any]) -> Shape:
-    """The shape `name` of SHAPES; `parameters` replace defaults of its function.
-
-    Raises StudyError for an unknown name or parameter, and for a value that is no number or that the shape refuses.
-    """
+    """The shape `name` of SHAPES; `parameters` replace defaults of its function. Raises StudyError for an unknown name
+    or parameter, and for a value that is no number or that the shape refuses."""
     make = lookup(name, SHAPES, "organ")
     signature = inspect.signature(make).parameters
     for parameter, value in parameters.items():

@@ -9,7 +9,7 @@ import numpy as np
 
 from studies.geometry.organs.millimetres import MM, check_lengths, metres, probe_near, si
 from studies.geometry.shape.blends import ellipsoid, groove, smooth_max, smooth_min
-from studies.geometry.shape.levelset import Literature, Shape, project
+from studies.geometry.shape.levelset import Literature, Shape
 from studies.geometry.shape.regions import EllipsoidRegion, Vector
 
 VOLUME = Literature(1500.0, "Henderson et al., Radiology 141 (1981) 525: 1,493 ± 230 mL by CT")
@@ -59,11 +59,3 @@ LIVER = liver_shape()
 LIVER_REGIONS = LIVER.regions
 assert LIVER.probe is not None  # liver_shape sets it
 LIVER_PROBE_POINT, LIVER_PROBE_NORMAL = LIVER.probe.point, LIVER.probe.normal
-
-
-def project_liver(points: np.ndarray) -> np.ndarray:
-    """Points (n, 3) [m], projected onto the true surface of the default liver along the gradient of its level function.
-
-    Raises StudyError for points too far from the surface.
-    """
-    return project(LIVER, points)

@@ -54,11 +54,9 @@ def box_of(*tubes: list[Sphere]) -> tuple[Vector, Vector]:
 
 
 def touch(level: Callable[[np.ndarray], np.ndarray], start: Vector, direction: Vector) -> PalpationPoint:
-    """The point [m] where a ray from `start` [mm] along `direction` first meets level = 0, and the unit normal there.
-
+    """The point [m] where a ray from `start` [mm] along `direction` first meets level = 0, and the unit normal there;
     level: points (n, 3) [mm] -> (n,) [mm]. Raises StudyError if `start` lies inside, or if the ray meets no surface
-    within 300 mm.
-    """
+    within 300 mm."""
     along = np.asarray(direction, float) / np.linalg.norm(direction)
     low, high = 0.0, 300.0
     # Each round divides the interval by 100. After eight it is below the spacing of floating-point numbers near 300.
@@ -74,10 +72,8 @@ def touch(level: Callable[[np.ndarray], np.ndarray], start: Vector, direction: V
 
 
 def probe_near(shape: Shape, seed: Vector) -> PalpationPoint:
-    """The probe at the surface point [m] that the projection of `seed` [m] along the gradient reaches.
-
-    Raises StudyError if `seed` lies too far from the surface.
-    """
+    """The probe at the surface point [m] that the projection of `seed` [m] along the gradient reaches. Raises
+    StudyError if `seed` lies too far from the surface."""
     point = project(shape, np.array([seed]))
     normal = normals(shape, point)[0]
     return PalpationPoint((float(point[0, 0]), float(point[0, 1]), float(point[0, 2])), unit(*normal))

@@ -28,11 +28,9 @@ def distance_grid(points: np.ndarray, triangles: np.ndarray, cell: float, margin
 
 
 def squared_distance(corners: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
-    """Squared distance [cells^2] of the points of a grid of `shape` to triangles with corners (t, 3, 3) [cells].
-
-    It is exact up to a distance of BAND. Farther out it is the distance to one triangle: the nearest triangle of the
-    nearest grid point within one cell of the surface.
-    """
+    """Squared distance [cells^2] of the points of a grid of `shape` to triangles with corners (t, 3, 3) [cells]: exact
+    up to a distance of BAND, farther out to one triangle, the nearest of the nearest grid point within one cell of the
+    surface."""
     squared, owner, scratch = np.full(shape, np.inf), np.zeros(shape, np.uint32), np.empty((4, 3))
     band_distance_into(corners, BAND, scratch, squared, owner)
     # One cell is enough: every point of the surface is within half the diagonal of a cell, 0.87, of a grid point.
@@ -67,10 +65,8 @@ def winding_number(points: np.ndarray, triangles: np.ndarray, axes: list[np.ndar
 
 
 def columns_under(corners: np.ndarray, shape: tuple[int, int]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Triangle and column i, j of all columns of the grid in the box of each triangle, each (m,).
-
-    corners: of the triangles in the xy plane, shape (t, 3, 2) [cells]; shape: number of columns along x and y.
-    """
+    """Triangle and column i, j of all columns of a grid of `shape` in the box of each triangle, each (m,); corners: of
+    the triangles in the xy plane, (t, 3, 2) [cells]."""
     first = np.clip(np.ceil(corners.min(axis=1)), 0, None).astype(int)
     last = np.clip(np.floor(corners.max(axis=1)), None, np.array(shape) - 1).astype(int)
     size = np.maximum(last - first + 1, 0)
@@ -82,10 +78,8 @@ def columns_under(corners: np.ndarray, shape: tuple[int, int]) -> tuple[np.ndarr
 
 
 def edge_function(flat: np.ndarray, start: np.ndarray, end: np.ndarray, ray: np.ndarray) -> np.ndarray:
-    """Twice the signed area of (start, end, ray) in the plane, shape (n,); the reverse edge has exactly its negative.
-
-    flat: points (m, 2); start, end: node numbers (n,); ray: points (n, 2).
-    """
+    """Twice the signed area of (start, end, ray) in the plane, (n,); the reverse edge has exactly its negative. flat:
+    points (m, 2); start, end: node numbers (n,); ray: points (n, 2)."""
     turned = start > end
     a, b = flat[np.where(turned, end, start)], flat[np.where(turned, start, end)]
     area = (b[:, 0] - a[:, 0]) * (ray[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (ray[:, 0] - a[:, 0])

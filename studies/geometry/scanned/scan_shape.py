@@ -37,18 +37,6 @@ BLUNT = 0.7
 """Standard deviation of the Gaussian, in cells, that removes the steps of the cells."""
 
 
-def scan_shape(points: np.ndarray, triangles: np.ndarray, nodes: int, smooth: float = 0.0, name: str = "scan") -> Shape:
-    """The shape that a closed outward triangulation of points (n, 3) [m] and triangles (t, 3) approximates.
-
-    nodes: of the mesh to be made, which decides the grid. smooth [m]: as in `levelled`; 0: only the facets of the file
-    are rounded, within a cell. Raises StudyError if smoothing leaves nothing of the shape.
-    """
-    cell = cell_for(points, triangles, nodes)
-    if smooth > 0:
-        points, triangles = levelled(points, triangles, cell, smooth, name)
-    return shape_of(grid_on(points, triangles, cell), name)
-
-
 def cell_for(points: np.ndarray, triangles: np.ndarray, nodes: int) -> float:
     """Edge [m] of the grid cells for a mesh of so many nodes."""
     diagonal, area = box_of(points, triangles)
@@ -69,48 +57,7 @@ def levelled(points: np.ndarray, triangles: np.ndarray, cell: float, smooth: flo
             f"{name}: smoothing over {1e3 * smooth:.3g} mm would leave nothing of a body of "
             f"{1e3 * diagonal:.3g} mm; use a few millimetres"
         )
-    return smoothed(points, triangles, min(cell, max(smooth / 2.0, FINEST * diagonal)), smooth, name)
-
-
-def grid_on(points: np.ndarray, triangles: np.ndarray, cell: float) -> DistanceGrid:
-    """The signed distance to the surface on a grid of cells of edge `cell` [m]."""
-    return distance_grid(points, triangles, cell, ROOM * cell)
-
-
-def faithful(
-    points: np.ndarray, triangles: np.ndarray, cell: float, name: str, allowed: float = MISSED
-) -> tuple[DistanceGrid, Surface]:
-    """The signed distance to a surface and its first triangulation, on a grid fine enough for its thin parts.
-
-    The cells start at `cell` [m] and shrink, down to FINEST of the diagonal, as long as the surface is farther than
-    `allowed` of the diagonal from the triangulation. A finer grid with more handles is not used: the handles are holes
-    in parts that are too thin for it.
-    """
-    diagonal, _ = box_of(points, triangles)
-    grid = grid_on(points, triangles, cell)
-    start = scan_surface(shape_of(grid, name))
-    while cell > 1.01 * FINEST * diagonal and missed(points, triangles, start) > allowed * diagonal:
-        cell = max(cell / FINER, FINEST * diagonal)
-        finer = grid_on(points, triangles, cell)
-        fine = scan_surface(shape_of(finer, name))
-        if handles_of(*fine) <= handles_of(*start):
-            grid, start = finer, fine
-    return grid, start
-
-
-def missed(points: np.ndarray, triangles: np.ndarray, start: Surface) -> float:
-    """Largest distance [m] of the nodes of a surface from a triangulation of it, measured at ASKED nodes at most."""
-    used = np.unique(triangles)
-    return float(distance_to_surface(points[used[:: -(-len(used) // ASKED)]], *start).max())
-
-
-def scan_surface(shape: Shape) -> Surface:
-    """The first triangulation of a scan, reduced to its largest part: parts thinner than a cell leave fragments."""
-    return largest_part(*first_surface(shape))
-
-
-def smoothed(points: np.ndarray, triangles: np.ndarray, cell: float, smooth: float, name: str) -> Surface:
-    """The surface after closing and levelling on cells of edge `cell` [m]; see `levelled`."""
+    cell = min(cell, max(smooth / 2.0, FINEST * diagonal))
     room = smooth + ROOM * cell
     out = iso_surface(distance_grid(points, triangles, cell, room + smooth), smooth, name)
     back = iso_surface(distance_grid(*out, cell, room), -smooth, name)
@@ -125,11 +72,37 @@ def smoothed(points: np.ndarray, triangles: np.ndarray, cell: float, smooth: flo
     return iso_surface(blurred, shift, name)
 
 
-def iso_surface(grid: DistanceGrid, value: float, name: str) -> Surface:
-    """The largest part of the surface where the distance is `value` [m], with outward triangles.
+def faithful(
+    points: np.ndarray, triangles: np.ndarray, cell: float, name: str, allowed: float = MISSED
+) -> tuple[DistanceGrid, Surface]:
+    """The signed distance to a surface and its first triangulation, on a grid fine enough for its thin parts.
 
-    Raises StudyError if no distance of the grid is below the value, or none above it.
+    The cells start at `cell` [m] and shrink, down to FINEST of the diagonal, as long as the surface is farther than
+    `allowed` of the diagonal from the triangulation. A finer grid with more handles is not used: the handles are holes
+    in parts that are too thin for it.
     """
+    diagonal, _ = box_of(points, triangles)
+    used = np.unique(triangles)
+    asked = points[used[:: -(-len(used) // ASKED)]]
+    grid = distance_grid(points, triangles, cell, ROOM * cell)
+    start = scan_surface(shape_of(grid, name))
+    while cell > 1.01 * FINEST * diagonal and distance_to_surface(asked, *start).max() > allowed * diagonal:
+        cell = max(cell / FINER, FINEST * diagonal)
+        finer = distance_grid(points, triangles, cell, ROOM * cell)
+        fine = scan_surface(shape_of(finer, name))
+        if handles_of(*fine) <= handles_of(*start):
+            grid, start = finer, fine
+    return grid, start
+
+
+def scan_surface(shape: Shape) -> Surface:
+    """The first triangulation of a scan, reduced to its largest part: parts thinner than a cell leave fragments."""
+    return largest_part(*first_surface(shape))
+
+
+def iso_surface(grid: DistanceGrid, value: float, name: str) -> Surface:
+    """The largest part of the surface where the distance is `value` [m], with outward triangles. Raises StudyError if
+    no distance of the grid is below the value, or none above it."""
     if not grid.values.min() < value < grid.values.max():
         raise StudyError(
             f"{name}: nothing of the body is left {1e3 * abs(value):.3g} mm inside its surface; smooth less"
@@ -144,9 +117,8 @@ def iso_surface(grid: DistanceGrid, value: float, name: str) -> Surface:
 def solidified(points: np.ndarray, triangles: np.ndarray, opening: float, name: str) -> Surface:
     """Outer surface of what triangles (t, 3) on points (n, 3) [m] enclose; openings up to `opening` [m] are closed.
 
-    The triangles may be open, doubled or one-sided. They are thickened by half the opening or TIGHT cells. The region
-    that is then reachable from outside is the outside, and it grows back by the same amount. Raises StudyError if
-    nothing is enclosed.
+    The triangles may be open, doubled or one-sided. They are thickened by half the opening or TIGHT cells; what is then
+    reachable from outside is the outside, and grows back by the same amount. Raises StudyError if nothing is enclosed.
     """
     used = points[np.unique(triangles)]
     cell = FINEST * float(np.linalg.norm(np.ptp(used, axis=0)))
@@ -170,20 +142,14 @@ def solidified(points: np.ndarray, triangles: np.ndarray, opening: float, name: 
 
 
 def true_grid(points: np.ndarray, triangles: np.ndarray, name: str) -> DistanceGrid:
-    """Signed distance to a closed outward surface of points (n, 3) [m] and triangles (t, 3), shifted by a constant.
-
-    The constant is far below a cell and gives the shape the volume of `target_volume`, to first order. Raises
-    StudyError if nothing of the shape is left on the grid.
-    """
+    """Signed distance to a closed outward surface of points (n, 3) [m] and triangles (t, 3), shifted by a constant, far
+    below a cell, that gives the shape the volume of `target_volume`, to first order. Raises StudyError if nothing of
+    the shape is left on the grid."""
     cell = COARSEST * box_of(points, triangles)[0]
-    return with_volume_of((points, triangles), *faithful(points, triangles, cell, name, NEAR), name)
-
-
-def with_volume_of(surface: Surface, grid: DistanceGrid, start: Surface, name: str) -> DistanceGrid:
-    """The grid shifted by a constant that gives its shape the `target_volume`; start: a triangulation of the shape."""
+    grid, start = faithful(points, triangles, cell, name, NEAR)
     volume = enclosed_volume(shape_of(grid, name), 1)
-    _, area = box_of(*start)
-    return DistanceGrid(grid.low, grid.cell, grid.values - (target_volume(surface, volume) - volume) / area)
+    missing = target_volume((points, triangles), volume) - volume
+    return DistanceGrid(grid.low, grid.cell, grid.values - missing / box_of(*start)[1])
 
 
 def target_volume(source: Surface, shape_volume: float) -> float:

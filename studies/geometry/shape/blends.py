@@ -13,11 +13,8 @@ def smooth_min(a: np.ndarray, b: np.ndarray, width: float) -> np.ndarray:
 
 
 def local_min(a: np.ndarray, b: np.ndarray, width: float) -> np.ndarray:
-    """Smooth union -k log(exp(-a / k) + exp(-b / k)), k = width/2.
-
-    It is as round as `smooth_min`, but lower than min(a, b) by 0.35 width at most, and equal to it where a and b differ
-    by a few widths, so that distances stay distances.
-    """
+    """Smooth union -k log(exp(-a / k) + exp(-b / k)), k = width/2: as round as `smooth_min`, but lower than min(a, b)
+    by 0.35 width at most, and equal to it where a and b differ by a few widths, so that distances stay distances."""
     k = 0.5 * width
     return np.minimum(a, b) - k * np.log1p(np.exp(-np.abs(a - b) / k))
 
@@ -28,10 +25,8 @@ def smooth_max(a: np.ndarray, b: np.ndarray, width: float) -> np.ndarray:
 
 
 def ellipsoid(x: np.ndarray, center: tuple[float, ...], semi_axes: tuple[float, ...]) -> np.ndarray:
-    """Level k (k - 1) / |x / a^2|, k = |x / a|, shape (n,), of an ellipsoid with semi-axes a along x, y, z at x (n, 3).
-
-    Its slope on the surface is 1.
-    """
+    """Level k (k - 1) / |x / a^2|, k = |x / a|, shape (n,), of an ellipsoid with semi-axes a along x, y, z at x (n, 3);
+    its slope on the surface is 1."""
     scaled = (x - np.asarray(center, float)) / np.asarray(semi_axes, float)
     k = np.linalg.norm(scaled, axis=1)
     # The lower bound avoids 0/0 at the centre.
@@ -67,8 +62,8 @@ def canal(x: np.ndarray, spheres: Sequence[Sphere]) -> np.ndarray:
     end is round and infinitely smooth if the last control sphere lies well inside the one before it (`closed` adds such
     spheres). Monge, Application de l'analyse a la geometrie, 1807.
     """
-    table = _table(tuple(spheres))
-    return np.concatenate([np.empty(0), *(_nearest(part, table) for part in _parts(np.asarray(x, float)))])
+    table, x = _table(tuple(spheres)), np.asarray(x, float)
+    return np.concatenate([np.empty(0), *(_nearest(x[k : k + BATCH], table) for k in range(0, len(x), BATCH))])
 
 
 @lru_cache
@@ -77,10 +72,6 @@ def _table(spheres: tuple[Sphere, ...]) -> np.ndarray:
     rows = _powers(np.asarray(spheres, float))
     first = _derivative(rows)
     return np.hstack([rows, first, _derivative(first)])
-
-
-def _parts(x: np.ndarray) -> list[np.ndarray]:
-    return [x[k : k + BATCH] for k in range(0, len(x), BATCH)]
 
 
 def _nearest(x: np.ndarray, table: np.ndarray) -> np.ndarray:

@@ -87,10 +87,10 @@ def project(
 ) -> np.ndarray:
     """Points (n, 3) [m] projected onto f = 0, and onto g = 0 for every further constraint g, shape (n, 3) [m].
 
-    Newton's method takes the smallest correction, d = -A^T (A A^T)^-1 r with the gradients as rows of A. It keeps the
-    gradients as long as the residual falls fast (chord method). within: residual [m] at which a point stays; None:
-    1e-13 of the size of the box. Raises StudyError if it does not converge: far from the surface, or where the
-    constraints do not meet.
+    Newton's method takes the smallest correction, d = -A^T (A A^T)^-1 r with the gradients as rows of A, which it keeps
+    as long as the residual falls fast (chord method). within: residual [m] at which a point stays; None: 1e-13 of the
+    size of the box. Raises StudyError if it does not converge: far from the surface, or where the constraints do not
+    meet.
     """
     x = np.array(points, float)
     levels = (shape.level, *constraints)
@@ -104,7 +104,11 @@ def project(
             return x
         new = moving[stale[moving]]
         if len(new):
-            rows[new] = forward_gradients(levels, x[new], residual[new], 1e-6 * shape.size)
+            # Forward differences suffice, because the residual decides where the points end.
+            step = 1e-6 * shape.size
+            shifted = (x[new][None, :, :] + step * np.eye(3)[:, None, :]).reshape(-1, 3)
+            ahead = np.stack([level(shifted).reshape(3, len(new)) for level in levels], axis=2)
+            rows[new] = (ahead - residual[new][None]).transpose(1, 2, 0) / step
         a, r = rows[moving], residual[moving]
         gram = a @ a.transpose(0, 2, 1) + 1e-12 * np.eye(len(levels))
         d = -(a.transpose(0, 2, 1) @ np.linalg.solve(gram, r[:, :, None]))[:, :, 0]
@@ -119,14 +123,3 @@ def project(
     raise StudyError(
         f"{shape.name}: points could not be brought onto the surface (still {worst:.2g} m away); start nearer to it"
     )
-
-
-def forward_gradients(levels: tuple[Level, ...], x: np.ndarray, values: np.ndarray, step: float) -> np.ndarray:
-    """Gradients, shape (n, l, 3), of l levels by forward differences with `step` [m] at x (n, 3) [m].
-
-    values: the levels at x, shape (n, l). These gradients suffice for Newton's method, because its residual decides
-    where the points end.
-    """
-    shifted = (x[None, :, :] + step * np.eye(3)[:, None, :]).reshape(-1, 3)
-    ahead = np.stack([level(shifted).reshape(3, len(x)) for level in levels], axis=2)
-    return (ahead - values[None]).transpose(1, 2, 0) / step

@@ -31,7 +31,7 @@ class HalfSpace:
     normal: Vector
 
     def level(self, points: np.ndarray) -> np.ndarray:
-        """Signed distance [m], shape (n,), of points (n, 3) [m]. Raises StudyError for a normal of length 0."""
+        """Signed distance [m], shape (n,). Raises StudyError for a normal of length 0."""
         normal = np.asarray(self.normal, float)
         length = np.linalg.norm(normal)
         if not length > 0:
@@ -60,10 +60,8 @@ class EllipsoidRegion:
     semi_axes: Vector
 
     def level(self, points: np.ndarray) -> np.ndarray:
-        """Scaled level [m], shape (n,), of points (n, 3) [m]: 0 on the ellipsoid, but no distance elsewhere.
-
-        Raises StudyError unless all semi-axes are above 0.
-        """
+        """Scaled level [m], shape (n,): 0 on the ellipsoid, no distance elsewhere. Raises StudyError unless all
+        semi-axes are above 0."""
         axes = np.asarray(self.semi_axes, float)
         if not (axes > 0).all():
             raise StudyError(f"an ellipsoid region with semi-axes {self.semi_axes} m is empty; give lengths above 0")
@@ -87,11 +85,9 @@ class PaintedRegion:
     width: float
 
     def level(self, points: np.ndarray) -> np.ndarray:
-        """Signed level [m], shape (n,), of points (n, 3) [m] near the surface: about the distance to the border.
-
-        Each sample is a Gaussian weighted with its area. On the border the painted samples and the others have the same
-        density.
-        """
+        """Signed level [m], shape (n,), of points (n, 3) [m] near the surface: about the distance to the border, on
+        which the Gaussians of the painted samples and of the others, weighted with their areas, have the same
+        density."""
         points, rows = np.asarray(points, float), np.asarray(self.samples, float)
         odds = np.concatenate([self._odds(points[k : k + BATCH], rows) for k in range(0, max(len(points), 1), BATCH)])
         # At distance s from a straight border the odds are log(Phi(t) / Phi(-t)), t = s / width: 4 phi(0) t near it and

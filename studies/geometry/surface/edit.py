@@ -9,11 +9,8 @@ from studies.geometry.mesh.quality import triangle_radius_ratio
 
 
 def with_node_count(points: np.ndarray, triangles: np.ndarray, nodes: int) -> tuple[np.ndarray, np.ndarray]:
-    """The triangulation after its longest edges are split or its shortest ones collapsed, until it has `nodes` nodes.
-
-    The neighbourhood of an edit is not edited again, so the result may have another number of nodes, as near as this
-    allows.
-    """
+    """The triangulation after its longest edges are split or its shortest ones collapsed, until it has `nodes` nodes,
+    or as near as is possible where the neighbourhood of an edit is not edited again."""
     split = len(points) < nodes
     edges = pick_edges(points, triangles, abs(len(points) - nodes), split)
     for k in range(len(edges)):
@@ -28,11 +25,8 @@ def with_node_count(points: np.ndarray, triangles: np.ndarray, nodes: int) -> tu
 
 def pick_edges(points: np.ndarray, triangles: np.ndarray, most: int, split: bool) -> np.ndarray:
     """Up to `most` edges, shape (e, 2), whose neighbourhoods are disjoint: the longest to split, or the shortest to
-    collapse.
-
-    After a split the opposite nodes have at most 7 edges. After a collapse they have at least 4, and the merged node
-    has at most 7.
-    """
+    collapse. After a split the opposite nodes have at most 7 edges. After a collapse they have at least 4, and the
+    merged node at most 7."""
     edges = unique_edges(triangles)
     valence = np.bincount(edges.ravel(), minlength=len(points))
     length = np.linalg.norm(points[edges[:, 0]] - points[edges[:, 1]], axis=1)
@@ -78,12 +72,9 @@ def collapse_edge(points: np.ndarray, triangles: np.ndarray, edge: np.ndarray) -
 def flip_edges(
     points: np.ndarray, triangles: np.ndarray, edges: np.ndarray, allowed: Callable[[int, int], bool], floor: float
 ) -> np.ndarray:
-    """The triangles with each of the edges (e, 2) flipped in its quadrilateral, if that helps.
-
-    It helps if no edge joins the opposite nodes k, l yet and `allowed(k, l)`, if both new triangles have at least the
-    radius ratio `floor` or 0.01 more than the worse old one, and if their normals are within 60 degrees of the sum of
-    the old ones.
-    """
+    """The triangles with each of the edges (e, 2) flipped in its quadrilateral, if no edge joins the opposite nodes k,
+    l yet and `allowed(k, l)`, if both new triangles have at least the radius ratio `floor` or 0.01 more than the worse
+    old one, and if their normals are within 60 degrees of the sum of the old ones."""
     triangles = triangles.copy()
     for i, j in edges:
         rows = np.flatnonzero(np.isin(triangles, (i, j)).sum(axis=1) == 2)

@@ -9,8 +9,9 @@ from studies.geometry.mesh.organ_mesh import signed_volume, unique_edges
 from studies.geometry.shape.levelset import Shape, at_depth, project
 
 SWEEPS = 8
-"""Without these sweeps marching cubes leave slivers, and the parametrisation of gmsh hangs or crashes on two shapes of
-three."""
+"""Moves by 0.7 of the way to the mean of the neighbours, each followed by a projection to within 1 % of a cell; the
+last projection is exact. Without them marching cubes leave slivers, and the parametrisation of gmsh hangs or crashes on
+two shapes of three."""
 
 
 def first_surface(shape: Shape) -> tuple[np.ndarray, np.ndarray]:
@@ -32,16 +33,10 @@ def first_surface(shape: Shape) -> tuple[np.ndarray, np.ndarray]:
     points, triangles = points.astype(float) + shape.low, triangles.astype(np.int64)
     if signed_volume(points, triangles) < 0:
         triangles = triangles[:, ::-1].copy()
-    return sweep(shape, points, triangles), triangles
-
-
-def sweep(shape: Shape, points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Points (n, 3) [m] after SWEEPS moves by 0.7 of the way to the mean of their neighbours, each followed by a
-    projection to within 1 % of a cell of f = 0; the last projection is exact."""
     edges = unique_edges(triangles)
     for _ in range(SWEEPS):
         points = project(shape, points + 0.7 * (neighbour_mean(points, edges) - points), within=0.01 * shape.cell)
-    return project(shape, points)
+    return project(shape, points), triangles
 
 
 def neighbour_mean(points: np.ndarray, edges: np.ndarray) -> np.ndarray:

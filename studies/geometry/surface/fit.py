@@ -54,11 +54,11 @@ FEWEST_AT_OUTLINE = 10
 
 
 def fitted(shape: Shape, base: Surface, nodes: int, regions: Sequence[Region], truth: Surface, curved: bool) -> "Fit":
-    """A surface that follows its shape, with the outline of every region on its edges and `nodes` nodes.
+    """A surface that follows its shape, with the outline of every region on its edges and `nodes` nodes, or fewer if no
+    edge can be split any more.
 
-    It has fewer nodes if no edge can be split any more. base: a surface of evenly spread nodes on f = 0, fewer than
-    `nodes`; truth: a fine surface; curved: the sides will be quadratic. Raises StudyError if an outline does not fit,
-    or if triangles cross.
+    base: a surface of evenly spread nodes on f = 0, fewer than `nodes`; truth: a fine surface; curved: the sides will
+    be quadratic. Raises StudyError if an outline does not fit, or if triangles cross.
     """
     fit = Fit(shape, base, [], truth, curved)
     fit.grow(len(base[0]) + round(BEFORE * (nodes - len(base[0]))))
@@ -119,10 +119,8 @@ class Fit:
             pass
 
     def add(self, count: int) -> int:
-        """Adds up to `count` nodes, far from each other, where the surface is farthest from its shape.
-
-        Returns how many.
-        """
+        """Adds up to `count` nodes, far from each other, where the surface is farthest from its shape; returns how
+        many."""
         (samples, ahead), (places, behind) = self.distances()
         targets, away = np.concatenate([samples, places]), np.concatenate([ahead, behind])
         apart = APART * mean_edge(*self.surface)
@@ -156,8 +154,8 @@ class Fit:
         return False
 
     def fill_outlines(self, nodes: int) -> None:
-        """Splits the longest edges of each outline until it has FEWEST_AT_OUTLINE edges, or twice as many if the area
-        error of its region is over AREA, as long as there are fewer than `nodes` nodes in all."""
+        """Splits the longest edges of each outline until it has FEWEST_AT_OUTLINE edges, twice as many if the area
+        error of its region is over AREA, as long as there are fewer than `nodes` nodes."""
         for region in self.regions:
             alone = Fit(self.shape, self.surface, [region], self.truth, self.curved)
             fewest = FEWEST_AT_OUTLINE * (2 if alone.area_error() > AREA else 1)
@@ -186,10 +184,8 @@ class Fit:
         return self.points, self.triangles
 
     def split(self, edge: np.ndarray, place: np.ndarray, on_outline: bool) -> bool:
-        """Splits an edge at a point `place` (3,) [m] on f = 0, then flips edges around it.
-
-        Returns False and changes nothing if that spoils a triangle or crosses an outline.
-        """
+        """Splits an edge at a point `place` (3,) [m] on f = 0, then flips edges around it; False, and nothing changed,
+        if that spoils a triangle or crosses an outline."""
         count = len(self.points)
         points, triangles = split_edge(self.points, self.triangles, edge)
         points[-1] = place

@@ -149,8 +149,8 @@ def normal(triangle: np.ndarray) -> np.ndarray:
 def overlapping_boxes(low: np.ndarray, high: np.ndarray) -> Iterator[np.ndarray]:
     """Yields in portions the pairs (p, 2), lower index first, of boxes with corners low, high (n, 3) that touch.
 
-    The boxes are sorted along a Z-curve. Repeated halving of that order gives a tree of bounding boxes without
-    pointers, and pairs of tree nodes are followed downwards as long as their boxes touch.
+    Repeated halving of their order along a Z-curve gives a tree of bounding boxes without pointers; pairs of tree nodes
+    are followed downwards as long as their boxes touch.
     """
     if not len(low):
         return

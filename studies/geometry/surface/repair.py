@@ -19,12 +19,11 @@ class RepairedSurface:
 
 
 def mend(points: np.ndarray, triangles: np.ndarray, name: str, holes: bool = False) -> RepairedSurface:
-    """The largest part of a welded surface of points (n, 3) [m] and triangles (t, 3), oriented outward.
+    """The largest part of a welded surface of points (n, 3) [m] and triangles (t, 3), without duplicate and collapsed
+    triangles, flipped to agree with their neighbours and to look outward.
 
-    Removes duplicate triangles, those without three different corners, and all parts except the largest. Flips
-    triangles to agree with their neighbours and to look outward. holes: whether each border is closed by a fan of
-    triangles over the mean of its nodes. name: for messages. Raises StudyError if nothing is left, or for a surface
-    with one side only.
+    holes: whether each border is closed by a fan of triangles over the mean of its nodes. name: for messages. Raises
+    StudyError if nothing is left, or for a surface with one side only.
     """
     remarks: list[str] = []
     whole = len(triangles)
@@ -62,10 +61,8 @@ def without_repeats(triangles: np.ndarray) -> np.ndarray:
 
 
 def edge_pairs(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Pairs (e, 2) of triangles that share an edge, and whether they run along it in opposite directions, (e,) bool.
-
-    At an edge with more than two triangles each is paired with the next.
-    """
+    """Pairs (e, 2) of triangles that share an edge, and whether they run along it in opposite directions, (e,) bool. At
+    an edge with more than two triangles each is paired with the next."""
     half = triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
     low, high = half.min(axis=1), half.max(axis=1)
     order = np.lexsort((high, low))

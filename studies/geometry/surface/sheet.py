@@ -1,8 +1,8 @@
 """The section of a closed surface by a plane, before meshing: its trace, the pieces that it leaves, and its checks."""
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from itertools import combinations
+from typing import NamedTuple
 
 import numpy as np
 from scipy.spatial import KDTree
@@ -19,18 +19,15 @@ GRAZING = 15.0
 differ from the surface by some degrees, and dihedral angles below 8 are refused."""
 
 
-@dataclass(frozen=True, eq=False)
-class Piece:
-    """A connected piece of the body on one side of a plane."""
+class Piece(NamedTuple):
+    """A connected piece of the body on one side of a plane: points (n, 3) [m] on its part of the surface and on the
+    trace, and its share of the whole volume [1]."""
 
     surface: np.ndarray
-    """Points on its part of the surface and on the trace [m], (n, 3)."""
     share: float
-    """Share of the whole volume [1]."""
 
 
-@dataclass(frozen=True, eq=False)
-class Sheet:
+class Sheet(NamedTuple):
     """The section of a closed surface by a plane."""
 
     trace: np.ndarray
@@ -126,10 +123,7 @@ def check_sheet(
 
 def check_apart(name: str, sheets: Mapping[str, tuple[HalfSpace, Sheet]], edge: float = 0.0) -> None:
     """Raises StudyError for two cuts of the organ or scene `name` whose sections meet, or whose outlines are less than
-    an `edge` [m] apart.
-
-    sheets: name of each cut -> its plane and its section of the surface.
-    """
+    an `edge` [m] apart. sheets: name of each cut -> its plane and its section of the surface."""
     for (one, (plane, first)), (other, (_, second)) in combinations(sheets.items(), 2):
         level = plane.level(second.trace.reshape(-1, 3)).reshape(-1, 2)
         # Inside the body the planes meet along a line, and where it leaves the body an outline crosses the other plane.

@@ -22,10 +22,8 @@ def region_side(region: Region, points: np.ndarray) -> np.ndarray:
 
 
 def region_area(region: Region, points: np.ndarray, triangles: np.ndarray) -> float:
-    """Area [m²] inside the region of a surface of points (n, 3) [m] and triangles (t, 3).
-
-    The level of the region is interpolated linearly on each triangle.
-    """
+    """Area [m²] inside the region of a surface of points (n, 3) [m] and triangles (t, 3), on each of which the level of
+    the region is interpolated linearly."""
     level = np.sort(region.level(points)[triangles], axis=1)
     low, middle, high = level.T
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -62,10 +60,8 @@ def with_middles(
     shape: Shape, points: np.ndarray, triangles: np.ndarray, regions: Sequence[Region], curved: bool
 ) -> tuple[np.ndarray, np.ndarray]:
     """Points followed by the mid-side nodes of all edges (m, 3) [m], and facets (t, 6): corners, then the nodes between
-    first and second, second and third, third and first corner.
-
-    curved: whether mid-side nodes are projected onto f = 0 and the outlines of `regions`; else they are midpoints.
-    """
+    first and second, second and third, third and first. curved: whether mid-side nodes are projected onto f = 0 and the
+    outlines of `regions`; else they are midpoints."""
     edges, count = unique_edges(triangles), len(points)
     middles = points[edges].mean(axis=1)
     if curved:

@@ -24,10 +24,8 @@ POOR = 0.4
 def outlined(
     shape: Shape, points: np.ndarray, triangles: np.ndarray, regions: Sequence[Region], near: float = np.inf
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The surface with the outline of every region on its edges. Raises StudyError if an outline does not fit.
-
-    Nodes of earlier outlines stay in place, and so do nodes with |level| over `near` [m].
-    """
+    """The surface with the outline of every region on its edges. Nodes of earlier outlines stay in place, and so do
+    nodes with |level| over `near` [m]. Raises StudyError if an outline does not fit."""
     fixed = np.zeros(len(points), bool)
     for region in regions:
         far = np.abs(region.level(points)) > near
@@ -52,7 +50,10 @@ def snap_region(
             if not len(crossing):
                 break
             chosen = choose_ends(points, crossing, region.level(points), fixed, other=pick % 2 == 1)
-            points = move_to_curve(shape, points, triangles, region, chosen, floor)
+            moved = points.copy()
+            if len(chosen):
+                moved[chosen] = project(shape, points[chosen], (region.level,))
+            points = without_spoilers(points, moved, triangles, floor)
         triangles = turn_edges(points, triangles, region, fixed, tolerance, floor)
         on_curve = np.abs(region.level(points)) <= tolerance
         points = relax(shape, points, triangles, region, on_curve, fixed)
@@ -67,10 +68,8 @@ def snap_region(
 def turn_edges(
     points: np.ndarray, triangles: np.ndarray, region: Region, fixed: np.ndarray, tolerance: float, floor: float
 ) -> np.ndarray:
-    """The triangles after flips of edges that cross the curve, then of edges of poor triangles.
-
-    No flip makes an edge that crosses the curve of `region`.
-    """
+    """The triangles after flips of edges that cross the curve of `region`, then of edges of poor triangles; no flip
+    makes one that crosses it."""
     level = region.level(points)
     side = np.sign(np.where(np.abs(level) <= tolerance, 0.0, level))
     crossing = crossing_edges(region, points, unique_edges(triangles), tolerance)
@@ -99,22 +98,9 @@ def choose_ends(
     return chosen[~fixed[chosen]]
 
 
-def move_to_curve(
-    shape: Shape, points: np.ndarray, triangles: np.ndarray, region: Region, chosen: np.ndarray, floor: float
-) -> np.ndarray:
-    """Points (n, 3) [m] with the chosen nodes moved onto the curve, except those whose move would spoil a triangle."""
-    moved = points.copy()
-    if len(chosen):
-        moved[chosen] = project(shape, points[chosen], (region.level,))
-    return without_spoilers(points, moved, triangles, floor)
-
-
 def without_spoilers(before: np.ndarray, after: np.ndarray, triangles: np.ndarray, floor: float) -> np.ndarray:
-    """`after` with the node of each bad triangle that moved farthest put back, until no triangle is bad.
-
-    A triangle is bad if its radius ratio falls below both `floor` and its former value, or if its normal turns by more
-    than 60 degrees.
-    """
+    """`after` with the node of each bad triangle that moved farthest put back, until none is bad: with a radius ratio
+    below both `floor` and its former value, or with a normal that turns by more than 60 degrees."""
     limit = np.minimum(floor, triangle_radius_ratio(before, triangles) - 1e-12)
     old_normals = triangle_normals(before, triangles)
     after = after.copy()
@@ -144,7 +130,7 @@ def relax(
     projected back onto f = 0; nodes on the curve of `region` stay on it.
 
     on_curve, fixed (n,) bool; fixed nodes stay. Moves that make a triangle worse than before and than a radius ratio of
-    0.6 are taken back, so triangles below 0.6 never get worse. Nodes do not change sides of the region.
+    0.6 are taken back. Nodes do not change sides of the region.
     """
     edges = unique_edges(triangles)
     curve = edges[on_curve[edges].all(axis=1)]

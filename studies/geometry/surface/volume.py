@@ -40,9 +40,9 @@ def with_volume(
     """Points (n, 3) [m] of a closed outward surface, moved so that its triangles (t, 3) enclose `volume` [m^3].
 
     level: of the shape, a distance [m] near its surface, on which the points lie. Each node moves along its normal by
-    the mean depth of the triangles around it below the shape, plus one length that is the same for all nodes and gives
-    the volume. Nodes on the outline of a region stay on it, and no node changes sides. Raises StudyError if no small
-    move gives the volume to ENOUGH without intersections.
+    the mean depth of the triangles around it, plus one length for all nodes that gives the volume. Nodes on the outline
+    of a region stay on it, and no node changes sides. Raises StudyError if no small move gives the volume to ENOUGH
+    without intersections.
     """
     keep, still = outline_keeper(points, regions), np.zeros(len(points), bool)
     for _ in range(ROUNDS):
@@ -88,10 +88,8 @@ def spoilt_nodes(before: np.ndarray, after: np.ndarray, triangles: np.ndarray) -
 
 
 def depth(points: np.ndarray, triangles: np.ndarray, level: Level) -> np.ndarray:
-    """Mean depth [m] of the triangles around each node below the surface of the shape, (n,), weighted by area.
-
-    That of a triangle is the mean over the middles of its edges, which is exact for a quadratic depth.
-    """
+    """Mean depth [m] of the triangles around each node below the surface of the shape, (n,), weighted by area; that of
+    a triangle is the mean over the middles of its edges, exact for a quadratic depth."""
     corners = points[triangles]
     middles = 0.5 * (corners + np.roll(corners, -1, axis=1))
     above = -level(middles.reshape(-1, 3)).reshape(-1, 3).mean(axis=1)

@@ -11,7 +11,7 @@ CAPS = {
     "top": HalfSpace((0.0, 0.0, CAP), (0.0, 0.0, -1.0)),
     "bottom": HalfSpace((0.0, 0.0, -CAP), (0.0, 0.0, 1.0)),
 }
-COUNTS = (150, 300, 550, 1100)
+COUNTS = (150, 300, 550)
 
 
 @pytest.fixture(scope="session")

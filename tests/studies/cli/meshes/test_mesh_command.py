@@ -100,12 +100,9 @@ def test_a_file_is_mended_remeshed_and_filled(organbench, tmp_path):
     made = read_mesh(target)
     assert made.volume == pytest.approx(1e-9 * signed_volume(POINTS, FACES), rel=1e-3)
     assert organbench("mesh", "--check", target)[0] == 0
-    # What was lost is printed, and stored in the mesh.
+    # What was lost is printed.
     assert "file to mesh: mean 0." in out and "mesh to file: mean 0." in out and "% of the diagonal) at (" in out
     assert re.search(r"volume: file (\S+) mL, mesh \1 mL \([+-]0\.00", out)
-    stored_numbers = meshio.read(target).field_data
-    assert stored_numbers["volume_mesh"] == pytest.approx(made.volume, rel=1e-9)
-    assert 0 < stored_numbers["file_to_mesh_max"] < 0.02 * stored_numbers["diagonal"]
 
 
 @pytest.mark.campaign

@@ -1,5 +1,6 @@
 """Damaged files of every format: a mesh or one sentence in words, at once, never the name of a Python type."""
 
+import os
 import re
 import warnings
 
@@ -9,7 +10,9 @@ import numpy as np
 import pytest
 
 from studies.base.errors import StudyError
+from studies.geometry import read_mesh, scan
 from studies.geometry.doctor.examine import examine
+from studies.geometry.files.faults import size_warning
 from studies.geometry.files.opening import opened
 from studies.geometry.files.units import Source
 from studies.geometry.mesh.organ_mesh import signed_volume
@@ -144,7 +147,22 @@ def test_surfaces_without_a_usable_triangle_are_findings(tmp_path, suffix):
     assert "collapsed" in [finding.code for finding in report.findings]
 
 
-def test_a_closed_surface_with_a_hole_in_its_numbers_is_a_finding_without_a_unit(tmp_path):
-    path = tmp_path / "nan.off"
-    path.write_text("OFF\n4 4 0\n0 0 0\n1 0 0\n0 1 0\nnan 0 1\n3 0 2 1\n3 0 1 3\n3 1 2 3\n3 0 3 2\n")
-    assert [finding.code for finding in examine(path).findings] == ["bad_points"]
+def test_a_binary_stl_that_is_too_short_is_refused_and_a_text_is_not_taken_for_one(tmp_path):
+    path = tmp_path / "half.stl"
+    meshio.write_points_cells(path, POINTS, [("triangle", FACES)], file_format="stl", binary=True)
+    path.write_bytes(path.read_bytes()[:2000])
+    sentence = r"half.stl is cut short: its header promises 48 triangles in 2,484 bytes, but it has 2,000; copy"
+    for read in (read_mesh, scan, examine):
+        with pytest.raises(StudyError, match=sentence):
+            read(path)
+    meshio.write_points_cells(path, POINTS, [("triangle", FACES)], file_format="stl", binary=False)
+    assert read_mesh(path).volume == pytest.approx(4.8e-5, rel=1e-6)
+
+
+def test_large_files_are_announced(tmp_path):
+    path = tmp_path / "huge.obj"
+    with open(path, "wb") as file:
+        file.truncate(600_000_000)  # takes no room on the disk
+    assert size_warning(path) == "huge.obj has 600 MB; to read and check it can take minutes"
+    os.truncate(path, 99_999_999)
+    assert size_warning(path) is None

@@ -1,5 +1,6 @@
 """Surfaces in the formats that people have, each with the volume and the parts that it was written with."""
 
+import meshio
 import numpy as np
 import pytest
 
@@ -106,34 +107,29 @@ def test_any_scale_leads_to_the_same_body(tmp_path, options):
     assert examine(Source(path, **options)).measures["volume"] == pytest.approx(8e-9 * VOLUME, rel=1e-6)
 
 
-@pytest.mark.parametrize(
-    ("options", "sentence"),
-    [
-        ({"scale": 0.0}, "a scale of 0 is asked for"),
-        ({"scale": float("nan")}, "a scale of nan"),
-        ({"longest_side": 12.0}, "an organ has 1 mm to 5 m"),
-        ({"longest_side": 0.1, "unit": "mm"}, "give the longest side, or a unit and a scale, but not both"),
-        ({"unit": "furlong"}, "use one of m, cm, mm, in"),
-    ],
-)
-def test_scales_that_are_none_are_refused(tmp_path, options, sentence):
+REFUSED = {
+    "a scale of 0 is asked for": {"scale": 0.0},
+    "a scale of nan": {"scale": float("nan")},
+    "an organ has 1 mm to 5 m": {"longest_side": 12.0},
+    "give the longest side, or a unit and a scale, but not both": {"longest_side": 0.1, "unit": "mm"},
+    "use one of m, cm, mm, in": {"unit": "furlong"},
+}
+
+
+@pytest.mark.parametrize("sentence", REFUSED)
+def test_scales_that_are_none_are_refused(tmp_path, sentence):
     with pytest.raises(StudyError, match=sentence):
-        Source(tmp_path / "egg.vtk", **options)
+        Source(tmp_path / "egg.vtk", **REFUSED[sentence])
 
 
-@pytest.mark.parametrize("factor", [1e300, 1e30, 1e9, 1e-9, 80e-9 / 0.06])
+@pytest.mark.parametrize("factor", [1e300, 80e-9 / 0.06])
 def test_sizes_beyond_all_organs_are_refused_at_once(tmp_path, factor):
-    text = "OFF\n" + f"{len(POINTS)} {len(FACES)} 0\n"
-    text += "\n".join(" ".join(f"{x:.17g}" for x in 1e-3 * factor * p) for p in POINTS) + "\n"
-    text += "\n".join(f"3 {a} {b} {c}" for a, b, c in FACES) + "\n"
-    path = written(tmp_path / "odd.off", text.encode())
+    path = tmp_path / "odd.off"
+    meshio.write_points_cells(path, 1e-3 * factor * POINTS, [("triangle", FACES)])
     limit = "smaller than 1 mm" if factor < 1 else "larger than 5 m"
     with pytest.raises(StudyError, match=f"the longest side is .* m; no organ is {limit}"):
         scan(path, 200, unit="m")
-    if factor in (1e300, 1e30):
+    for read in (examine, read_mesh) if factor > 1 else ():
         with pytest.raises(StudyError, match="no organ is larger than 5 m"):
-            examine(path, unit="m")
-        with pytest.raises(StudyError, match="no organ is larger than 5 m"):
-            read_mesh(path)
-    if factor == 80e-9 / 0.06:
-        assert "size" in [finding.code for finding in examine(path, unit="m").findings]
+            read(path, unit="m")
+    assert factor > 1 or "size" in [finding.code for finding in examine(path, unit="m").findings]

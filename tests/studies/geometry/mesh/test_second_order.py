@@ -8,7 +8,7 @@ import skfem
 from skfem.models.poisson import laplace
 
 from studies.base.errors import StudyError
-from studies.geometry import HalfSpace, ball, ball_octant, check_surface, curved, organ, organ_family
+from studies.geometry import HalfSpace, ball, curved, organ
 from studies.geometry.api import organs as api
 from studies.geometry.mesh.organ_mesh import unique_edges
 from studies.geometry.mesh.quality import PAIRS, curved_volume, jacobian_coefficients, smallest_jacobian
@@ -50,7 +50,7 @@ def determinants(points, xi):
 @pytest.mark.campaign
 @pytest.mark.parametrize("name", ["bladder", "spleen"])
 def test_volume_converges_at_the_orders_claimed(name):
-    family = organ_family(name, SIZES, regions={})
+    family = [organ(name, nodes, regions={}) for nodes in SIZES]
     exact = true_volume(SHAPES[name]())
     straight = [abs(mesh.volume / exact - 1) for mesh in family]
     smooth = [abs(curved(mesh).volume / exact - 1) for mesh in family]
@@ -91,20 +91,6 @@ def test_outlines_of_attachments_are_curves():
     points = made.points[[middle[edge] for edge in map(tuple, rim.tolist())]]
     assert np.abs(points[:, 2] - cap).max() < 1e-13
     assert np.abs(np.hypot(points[:, 0], points[:, 1]) - np.sqrt(RADIUS**2 - cap**2)).max() < 1e-13
-
-
-@pytest.mark.parametrize(
-    ("name", "nodes", "triangles"),
-    [("liver", 544, 1084), pytest.param("stomach", 550, 1096, marks=pytest.mark.campaign)],
-)
-def test_the_paper_s_meshes_have_its_counts(name, nodes, triangles):
-    """Jung, Hong, Choi 2005: 544 nodes and 1,084 triangles for the liver, 550 and 1,096 for the stomach.
-
-    The count of the stomach's mesh with its wall is in tests/studies/geometry/api/test_organs.py.
-    """
-    mesh = organ(name, nodes, fill=False)
-    assert (mesh.outer_count, len(mesh.triangles)) == (nodes, triangles)
-    check_surface(mesh.points, mesh.triangles)
 
 
 def test_a_wall_folds_unless_its_inner_nodes_follow(small):
@@ -174,17 +160,6 @@ def test_a_folded_element_is_unfolded_and_fixed_nodes_stay(small):
     assert (unfold(points, made.cells, np.zeros(len(points), bool)) == points).all()
 
 
-def test_octant_is_curved_on_its_sphere_and_flat_on_its_planes():
-    mesh = ball_octant(RADIUS, 0.015, 0.008)
-    made = curved(mesh)
-    assert made.volume == pytest.approx(BALL_VOLUME / 8, rel=5e-4) and made.points.min() == 0.0
-    assert abs(mesh.volume / BALL_VOLUME * 8 - 1) > 20 * abs(made.volume / BALL_VOLUME * 8 - 1)
-    for axis in range(3):
-        flat = {frozenset(e) for e in unique_edges(mesh.triangles).tolist() if (mesh.points[list(e), axis] == 0).all()}
-        assert len(flat) > 10
-        assert (made.points[:, axis] == 0).sum() >= len(flat)
-
-
 def test_true_volume_meets_closed_forms():
     assert true_volume(SHAPES["ball"](RADIUS)) == pytest.approx(BALL_VOLUME, rel=1e-6)
     hollow = BALL_VOLUME * (1 - 0.8**3)
@@ -200,19 +175,6 @@ def test_the_second_time_nothing_is_computed(small, monkeypatch):
     monkeypatch.setattr(api, "make_curved", lambda *_: pytest.fail("curved again"))
     again = curved(mesh)
     assert (again.points == first.points).all() and (again.cells == first.cells).all()
-
-
-@pytest.mark.parametrize(
-    ("call", "sentence"),
-    [
-        (lambda: curved(ball(150, fill=False)), "ball: only a filled mesh can be curved"),
-        (lambda: curved(replace(ball(150), recipe={})), "its true shape is not known"),
-        (lambda: organ_family("ball", (300, 150)), "a family of meshes needs growing node counts"),
-    ],
-)
-def test_bad_wishes_get_a_sentence(call, sentence):
-    with pytest.raises(StudyError, match=sentence):
-        call()
 
 
 def test_a_mesh_that_cannot_follow_its_shape_is_refused():

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from studies.base.errors import StudyError
-from studies.geometry import HalfSpace, ball, fill, organ
+from studies.geometry import ball, organ
 from studies.geometry.mesher import jobs, process
 from studies.geometry.mesher.jobs import mesh_from, recipe_hash
 from tests.campaigns import campaign
@@ -29,17 +29,13 @@ def same(one, other):
     return all((getattr(one, key) == getattr(other, key)).all() for key in ("points", "triangles", "tetrahedra"))
 
 
-def test_same_recipe_gives_the_same_mesh_bit_for_bit(bodies, own_cache):
-    for name, mesh in (("ball", bodies["ball"][300]), ("liver", bodies["liver"][300])):
-        again = mesh_from(mesh.recipe)
-        assert again is not mesh and same(again, mesh), name
-    assert len(list(own_cache.glob("*.npz"))) == 2 and not list(own_cache.glob("*.part"))
-
-
-def test_the_second_time_nothing_is_made(own_cache, monkeypatch):
-    first = ball(150)
+def test_same_recipe_gives_the_same_mesh_bit_for_bit_and_is_made_once(bodies, own_cache, monkeypatch):
+    mesh = bodies["liver"][150]
+    again = mesh_from(mesh.recipe)
+    assert again is not mesh and same(again, mesh)
+    assert len(list(own_cache.glob("*.npz"))) == 1 and not list(own_cache.glob("*.part"))
     monkeypatch.setattr(jobs, "run_worker", lambda *_: pytest.fail("meshed again"))
-    assert same(ball(150), first)
+    assert same(mesh_from(mesh.recipe), mesh)
 
 
 @pytest.mark.parametrize(("name", "nodes"), [("ball", 100), campaign("stomach", 300)])
@@ -60,15 +56,15 @@ def test_a_surface_made_before_is_filled_as_if_made_now(own_cache, monkeypatch, 
 
 
 def test_a_warning_names_a_damaged_cache_file_that_is_made_again(own_cache):
-    first = ball(150)
+    first = ball(100)
     (path,) = own_cache.glob("*.npz")
     whole = path.read_bytes()
     middle = len(whole) // 2
     flipped = whole[:middle] + bytes([whole[middle] ^ 255]) + whole[middle + 1 :]
-    for broken in (whole[:1000], b"", flipped):
+    for broken in (whole[:1000], flipped):
         path.write_bytes(broken)
         with pytest.warns(UserWarning, match="is damaged .* made again"):
-            assert same(ball(150), first)
+            assert same(ball(100), first)
         assert path.read_bytes() != broken
 
 
@@ -133,11 +129,3 @@ def test_a_long_name_of_a_file_fits_into_the_cache(own_cache):
     assert len(mesh_from(RECIPE | {"name": name, "fill": False}).points) == 150
     (path,) = own_cache.glob("*.npz")
     assert len(path.name.encode()) < 120
-
-
-def test_fill_keeps_surface_and_patches(balls):
-    bare = ball(300, regions={"top": HalfSpace((0, 0, 0.035), (0, 0, -1))}, fill=False)
-    assert not len(bare.tetrahedra) and len(bare.points) == 300
-    body = fill(bare)
-    assert (body.points[:300] == bare.points).all() and (body.triangles == bare.triangles).all()
-    assert len(body.tetrahedra) > 1000 and (body.patches["top"] == bare.patches["top"]).all()

@@ -1,28 +1,23 @@
 """The organs as functions of position: sizes from the literature, even walls, boxes, attachments, refusals."""
 
-import ast
 import inspect
 import json
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 from skimage.measure import euler_number, label
 
 from studies.base.errors import StudyError
-from studies.geometry.mesh.organ_mesh import signed_volume, triangle_areas
+from studies.geometry import LIVER_PRESS_DIRECTION, LIVER_PROBE_NORMAL, LIVER_PROBE_POINT
+from studies.geometry.mesh.organ_mesh import signed_volume, triangle_areas, triangle_normals
 from studies.geometry.organs import SHAPES, vary
-from studies.geometry.shape.levelset import at_depth, gradient, normals
+from studies.geometry.shape.levelset import at_depth, gradient, normals, project
 from studies.geometry.surface.first_surface import first_surface
 
 ORGANS = tuple(name for name, make in SHAPES.items() if make().literature is not None)
 HOLLOW = tuple(name for name in ORGANS if SHAPES[name]().wall is not None)
 MM = 1e-3
-
-
-def lumen_of(shape):
-    return at_depth(shape, shape.wall)
 
 
 @pytest.fixture(scope="module")
@@ -34,14 +29,9 @@ def fine():
 @pytest.mark.parametrize("name", ORGANS)
 def test_volume_is_that_of_the_literature(fine, name):
     shape = SHAPES[name]()
-    surface = first_surface(replace(lumen_of(shape), cell=4 * MM)) if shape.wall else fine[name]
+    surface = first_surface(replace(at_depth(shape, shape.wall), cell=4 * MM)) if shape.wall else fine[name]
     # Facets 4 mm wide cut off 0.2 to 1 per cent; the spread between people is far larger.
     assert signed_volume(*surface) * 1e6 == pytest.approx(shape.literature.volume_ml, rel=0.15)
-
-
-@pytest.mark.parametrize("name", ORGANS)
-def test_outside_and_lumen_are_one_piece_without_holes_or_handles(name):
-    check_topology(SHAPES[name](), cell=4 * MM)
 
 
 def check_topology(shape, cell):
@@ -60,7 +50,7 @@ def check_topology(shape, cell):
     return level
 
 
-def check_variant(name, seed, spread=0.2):
+def check_variant(name, seed, spread):
     """A random organ is closed, of genus 0 inside and out, in its box, with a wall that fits and attachments."""
     shape = SHAPES[name](**vary(name, seed, spread))
     level = check_topology(shape, cell=5 * MM)
@@ -68,21 +58,13 @@ def check_variant(name, seed, spread=0.2):
     if shape.wall:
         # The wall is nowhere thicker than the organ, whose thickest part is at the lowest level.
         assert shape.wall < 0.25 * -level.min()
-    return shape
 
 
 @pytest.mark.parametrize("name", ORGANS)
-def test_random_organs_are_organs(name):
-    for seed in range(4):
-        check_variant(name, seed)
-    check_variant(name, 4, spread=0.3)
-
-
-@pytest.mark.campaign
-@pytest.mark.parametrize("name", ORGANS)
-def test_forty_random_organs_are_organs(name):
-    for seed in range(40):
-        check_variant(name, seed)
+def test_organs_and_random_ones_are_organs(name):
+    check_topology(SHAPES[name](), cell=4 * MM)
+    for seed, spread in ((0, 0.2), (1, 0.2), (4, 0.3)):
+        check_variant(name, seed, spread)
 
 
 @pytest.mark.parametrize("name", ORGANS)
@@ -160,33 +142,59 @@ def test_what_is_symmetric_is_symmetric(organ, axis):
     assert shape.level(x) == pytest.approx(shape.level(mirrored), abs=1e-14)
 
 
-@pytest.mark.parametrize("name", SHAPES)
-def test_an_organ_is_a_file_of_under_forty_lines_of_code(name):
-    source = Path(inspect.getfile(SHAPES[name])).read_text(encoding="utf-8")
-    tree = ast.parse(source)
-    words = [node for node in ast.walk(tree) if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)]
-    prose = {line for node in words for line in range(node.lineno, (node.end_lineno or node.lineno) + 1)}
-    code = [
-        text
-        for number, text in enumerate(source.splitlines(), 1)
-        if number not in prose and text.strip() and not text.strip().startswith("#")
-    ]
-    assert len(code) < 40, len(code)
+def test_the_liver_is_a_wedge_with_a_notch_and_grooves():
+    shape = SHAPES["liver"]()
+
+    def inside(x, y, z):
+        return shape.level(np.array([[x, y, z]]) * MM)[0] < 0
+
+    # Between the front margin and the back of the visceral face there is air: the face is hollow.
+    assert inside(-45, -38, -57) and inside(-45, 60, 4) and not inside(-45, 11, -26.5)
+    points, _ = first_surface(shape)
+    heights = [np.ptp(points[np.abs(points[:, 0] - x) < 0.008][:, 2]) for x in (-0.03, 0.05, 0.10)]
+    assert heights[0] > 1.5 * heights[1] > 2.0 * heights[2] > 0  # thin out to the tip of the left lobe
+    # Across the falciform line, on the front, the middle is further back than both sides (y points to the back).
+    sides = project(shape, np.array([[x, -0.06, 0.02] for x in (0.003, 0.017, 0.031)]))
+    assert sides[1, 1] > 0.5 * (sides[0, 1] + sides[2, 1]) + 1e-3
+    # Along the lower margin the notch cuts in: the lowest level there rises above that of its neighbours' line.
+    z = np.linspace(-0.1, 0.05, 1501)
+    lowest = []
+    for x in (-0.01, 0.017, 0.044):
+        columns = [np.column_stack([np.full_like(z, x), np.full_like(z, y), z]) for y in np.linspace(-0.07, -0.03, 21)]
+        levels = [(column[:, 2], shape.level(column)) for column in columns]
+        lowest.append(min(height[level < 0].min() for height, level in levels if (level < 0).any()))
+    assert lowest[1] > 0.5 * (lowest[0] + lowest[2]) + 2e-3
 
 
-@pytest.mark.parametrize(
-    ("call", "sentence"),
-    [
-        (lambda: SHAPES["kidney"](length=-110.0), "kidney: length = -110.0 mm is not a length"),
-        (lambda: SHAPES["spleen"](notch=float("nan")), "spleen: notch = nan mm is not a length"),
-        (lambda: SHAPES["stomach"](wall=40.0), "stomach: a wall of 40 mm leaves no lumen"),
-        (lambda: SHAPES["bladder"](wall=12.0), "bladder: a wall of 12 mm leaves no lumen"),
-        (lambda: SHAPES["liver"](depth=float("inf")), "liver: depth = inf mm is not a length"),
-        (lambda: vary("kidny", 0), "unknown organ 'kidny'; did you mean 'kidney'"),
-        (lambda: vary("kidney", -1), "the seed -1 is not a whole number"),
-        (lambda: vary("kidney", 0, 0.5), "a spread of 0.5 is outside 0 to 0.3"),
-    ],
-)
-def test_impossible_organs_get_a_sentence(call, sentence):
+def test_a_plane_meets_the_liver_head_on_where_it_is_smooth():
+    shape, press = SHAPES["liver"](), np.array(LIVER_PRESS_DIRECTION)
+    assert (shape.probe.point, shape.probe.normal) == (LIVER_PROBE_POINT, LIVER_PROBE_NORMAL)
+    assert LIVER_PROBE_NORMAL[1] < -0.8
+    points, triangles = first_surface(shape)
+    near = points[np.linalg.norm(points - points[np.argmin(points @ press)], axis=1) < 0.012]
+    # Smooth over the 2.4 cm that touch first; on the thin margin it would be -0.55 to -0.02.
+    assert len(near) > 20 and (normals(shape, near) @ press).max() < -0.8
+    # The bare area looks the way the plane pushes: pressed against, not torn off.
+    held = (shape.regions["bare_area"].level(points) < 0)[triangles].all(axis=1)
+    patch = triangle_normals(points, triangles[held]).sum(axis=0)
+    assert patch @ press > 0.9 * np.linalg.norm(patch)
+
+
+REFUSED = {
+    "kidney: length = -110.0 mm is not a length": lambda: SHAPES["kidney"](length=-110.0),
+    "spleen: notch = nan mm is not a length": lambda: SHAPES["spleen"](notch=float("nan")),
+    "stomach: a wall of 40 mm leaves no lumen": lambda: SHAPES["stomach"](wall=40.0),
+    "bladder: a wall of 12 mm leaves no lumen": lambda: SHAPES["bladder"](wall=12.0),
+    "liver: depth = inf mm is not a length": lambda: SHAPES["liver"](depth=float("inf")),
+    "a wall of 0.06 m does not fit into a ball of radius 0.05 m": lambda: SHAPES["ball"](wall=0.06),
+    "a wall of 0.0 m does not fit": lambda: SHAPES["ball"](wall=0.0),
+    "unknown organ 'kidny'; did you mean 'kidney'": lambda: vary("kidny", 0),
+    "the seed -1 is not a whole number": lambda: vary("kidney", -1),
+    "a spread of 0.5 is outside 0 to 0.3": lambda: vary("kidney", 0, 0.5),
+}
+
+
+@pytest.mark.parametrize("sentence", REFUSED)
+def test_impossible_organs_get_a_sentence(sentence):
     with pytest.raises(StudyError, match=sentence):
-        call()
+        REFUSED[sentence]()

@@ -1,9 +1,16 @@
-"""Building blocks of the level functions against closed forms."""
+"""Level functions, their building blocks and regions against closed forms."""
 
 import numpy as np
 import pytest
 
-from studies.geometry.shape.blends import canal, closed, local_min, smooth_min
+from studies.base.errors import StudyError
+from studies.geometry import BallRegion, EllipsoidRegion, HalfSpace
+from studies.geometry.organs import SHAPES
+from studies.geometry.shape.blends import canal, closed, ellipsoid, groove, local_min, smooth_max, smooth_min
+from studies.geometry.shape.levelset import gradient, normals, project
+from studies.geometry.shape.regions import region_from_dict, region_to_dict
+
+BALL = SHAPES["ball"](0.05)
 
 
 def test_canal_of_two_spheres_is_the_round_cone():
@@ -32,10 +39,6 @@ def test_canal_is_the_smallest_distance_to_its_spheres():
     distance = canal(x, spheres)
     # Sampling misses the minimum by curvature * spacing^2 / 8, some 1e-7 here, and never lies below it.
     assert (distance <= brute + 1e-12).all() and (brute - distance).max() < 1e-6
-
-
-def test_canal_of_no_point_is_empty():
-    assert canal(np.empty((0, 3)), [(0, 0, 0, 1.0), (1, 0, 0, 1.0)]).shape == (0,)
 
 
 def largest_jump_of_curvature(spheres, count):
@@ -76,3 +79,44 @@ def test_local_min_is_a_rounded_and_local_union():
     rounding = (local_min(h, -h, 16.0) - 2 * local_min(0.0, 0.0, 16.0) + local_min(-h, h, 16.0)) / h**2
     hyperbola = (smooth_min(h, -h, 16.0) - 2 * smooth_min(0.0, 0.0, 16.0) + smooth_min(-h, h, 16.0)) / h**2
     assert rounding == pytest.approx(hyperbola, rel=1e-4)  # as round as the other one
+
+
+def test_blends_have_their_limits():
+    a, b = np.array([-3.0, 1.0, 50.0]), np.array([2.0, 1.0, -50.0])
+    assert smooth_min(a, b, 0.0) == pytest.approx(np.minimum(a, b))
+    assert smooth_max(a, b, 0.0) == pytest.approx(np.maximum(a, b))
+    assert smooth_min(a, b, 2.0)[1] == pytest.approx(0.0) and smooth_max(a, b, 2.0)[1] == pytest.approx(2.0)
+    x = np.random.default_rng(2).normal(size=(20, 3))
+    assert ellipsoid(x, (0, 0, 0), (2, 2, 2)) == pytest.approx(np.linalg.norm(x, axis=1) - 2, rel=1e-12)
+    tip = np.array([[3.0, 0, 0], [0, 0, 0]])
+    level = ellipsoid(tip, (0, 0, 0), (3, 1, 2))
+    assert level[0] == pytest.approx(0.0, abs=1e-12) and np.isfinite(level[1])
+    press = groove(np.array([[0.0, 0, 0], [0.5, 2, 0], [9, 0, 0]]), (0, 0, 0), (1, 0, 0), width=2.0, depth=5.0)
+    assert press == pytest.approx([5.0, 5.0 / np.e, 5.0 * np.exp(-16)])
+
+
+def test_gradient_and_normals_are_those_of_the_ball():
+    x = np.random.default_rng(0).normal(size=(30, 3))
+    radial = x / np.linalg.norm(x, axis=1, keepdims=True)
+    assert gradient(BALL.level, 0.05 * radial, 1e-7) == pytest.approx(radial, abs=1e-8)
+    assert normals(BALL, 0.05 * radial) == pytest.approx(radial, abs=1e-8)
+
+
+def test_projection_meets_two_surfaces_at_once():
+    x = np.random.default_rng(1).uniform(-0.03, 0.03, size=(40, 3)) + np.array([0.04, 0.04, 0.0])
+    on = project(BALL, x, (lambda p: p[:, 2] - 0.01,))
+    assert np.abs(np.linalg.norm(on, axis=1) - 0.05).max() < 1e-13 and np.abs(on[:, 2] - 0.01).max() < 1e-13
+    with pytest.raises(StudyError, match="could not be brought onto the surface"):
+        project(BALL, x, (lambda p: p[:, 2] - 0.2,))  # a plane that misses the ball
+
+
+def test_levels_of_regions_are_negative_inside_and_survive_json():
+    x = np.array([[0.0, 0.0, 2.0], [0.0, 0.0, 0.5]])
+    for region, level in (
+        (HalfSpace((0, 0, 1), (0, 0, 4.0)), [1.0, -0.5]),
+        (BallRegion((0, 0, 2), 1.0), [-1.0, 0.5]),
+        (EllipsoidRegion((0, 0, 0), (5, 5, 1)), [1.0, -0.5]),
+    ):
+        again = region_from_dict(region_to_dict(region))
+        assert region.level(x) == pytest.approx(level) and type(again) is type(region)
+        assert (again.level(x) == region.level(x)).all()

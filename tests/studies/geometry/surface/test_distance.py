@@ -4,9 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.spatial import KDTree
 
-from studies.geometry import ball
 from studies.geometry.surface.distance import ChangingFacets, SurfaceDistance, distance_to_surface, hausdorff
 from tests.studies.tiny import cube
 
@@ -22,20 +20,6 @@ REGIONS = {
     "vertex b": ((5.0, -2.0, 2.0), 3.0),
     "vertex c": ((-1.0, 5.0, -2.0), 3.0),
 }
-unit = st.floats(-1.0, 1.0, allow_subnormal=False, width=32)
-point = st.tuples(unit, unit, unit)
-
-
-def dense(a, b, c, count=60):
-    """Points all over a triangle, ((count + 1)(count + 2)/2, 3)."""
-    i, j = np.meshgrid(np.arange(count + 1), np.arange(count + 1))
-    s, t = (w[i + j <= count] / count for w in (i, j))
-    return a + s[:, None] * (b - a) + t[:, None] * (c - a)
-
-
-def nearest_vertex(queries, points, triangles):
-    """The mutant: as if a surface were its nodes."""
-    return KDTree(points[np.unique(triangles)]).query(queries)[0]
 
 
 @pytest.mark.parametrize(("query", "distance"), REGIONS.values(), ids=REGIONS)
@@ -56,25 +40,7 @@ def test_a_triangle_without_area_is_its_longest_side():
         np.testing.assert_allclose(distances, beyond, atol=1e-12)
 
 
-def test_nearest_vertex_would_be_noticed():
-    inner = [name for name in REGIONS if "vertex" not in name]
-    for name in inner:
-        query, distance = REGIONS[name]
-        assert nearest_vertex(np.array([query]), TRIANGLE, ONE)[0] > distance + 0.05
-
-
-@settings(deadline=None, max_examples=100)
-@given(point, point, point, point)
-def test_a_triangle_is_all_its_points(p, a, b, c):
-    p, a, b, c = map(np.array, (p, a, b, c))
-    sides = [np.linalg.norm(v) for v in (b - a, c - b, a - c)]
-    distance = distance_to_surface(p[None], np.array([a, b, c]), ONE)[0]
-    sampled = float(np.linalg.norm(dense(a, b, c) - p, axis=1).min())
-    # A point of a triangle is at most one spacing of the samples away from one of them.
-    assert distance - 1e-7 <= sampled <= distance + max(sides) / 60 + 1e-7
-
-
-@settings(deadline=None, max_examples=50)
+@settings(deadline=None, max_examples=20)
 @given(st.integers(0, 2**32 - 1))
 def test_a_soup_is_all_its_triangles(seed):
     """Long triangles among short ones: the nearest one need not have a near centroid."""
@@ -86,16 +52,6 @@ def test_a_soup_is_all_its_triangles(seed):
     distances = distance_to_surface(queries, corners.reshape(-1, 3), triangles)
     single = [distance_to_surface(queries, c, ONE) for c in corners]
     np.testing.assert_allclose(distances, np.min(single, axis=0), rtol=1e-12, atol=1e-14)
-
-
-def test_concentric_spheres():
-    mesh = ball(300, 0.05, fill=False)
-    points, triangles = mesh.points, mesh.triangles
-    outer = 1.2 * points
-    # Chords lie inside the sphere: seen from outside, the other surface is farther by their sag, edge²/8R ≈ 1.2 % of R.
-    distance = hausdorff(points, triangles, outer, triangles)
-    assert 0.2 * 0.05 * (1 - 1e-12) <= distance <= 0.2 * 0.05 + 0.012 * 0.05
-    assert hausdorff(points, triangles, points, triangles) < 1e-12
 
 
 def test_shifted_planes_and_symmetry():
@@ -120,7 +76,7 @@ def soup(random, facets):
 PIECES = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]])
 
 
-@settings(deadline=None, max_examples=20)
+@settings(deadline=None, max_examples=10)
 @given(st.integers(0, 2**32 - 1))
 def test_distances_of_changing_facets_are_the_same_to_the_bit(seed):
     """Facets come, go, change places in the list, and move by one rounding."""

@@ -1,4 +1,4 @@
-"""The pieces of the mesher, each against a closed form."""
+"""First surfaces of all shapes, and edits of a net: nodes come and go, edges turn."""
 
 import numpy as np
 import pytest
@@ -7,8 +7,7 @@ from studies.base.errors import StudyError
 from studies.geometry import ball, check_surface
 from studies.geometry.mesh.organ_mesh import triangle_areas, unique_edges
 from studies.geometry.organs import SHAPES
-from studies.geometry.shape.blends import ellipsoid, groove, smooth_max, smooth_min
-from studies.geometry.shape.levelset import Shape, gradient, normals, project
+from studies.geometry.shape.levelset import Shape, project
 from studies.geometry.surface.edit import collapse_edge, flip_edges, split_edge, with_node_count
 from studies.geometry.surface.first_surface import first_surface
 from studies.geometry.surface.node_count import surface_with
@@ -30,46 +29,14 @@ def test_first_surface_is_closed_smooth_and_on_the_shape(name):
     check_surface(points, triangles)
     assert np.abs(shape.level(points)).max() < 1e-12 * shape.size
     assert len(points) - len(unique_edges(triangles)) + len(triangles) == 2
-
-
-def test_first_surface_of_the_ball_has_its_area():
-    area = triangle_areas(*first_surface(BALL)).sum()
-    assert area == pytest.approx(4 * np.pi * 0.05**2, rel=0.01)  # 1,300 facets lose 0.4 per cent
+    # 1,300 facets of the ball lose 0.4 per cent.
+    assert name != "ball" or triangle_areas(points, triangles).sum() == pytest.approx(4 * np.pi * 0.05**2, rel=0.01)
 
 
 def test_a_shape_outside_its_box_is_refused():
     for low, high in (((-0.04,) * 3, (0.04,) * 3), ((0.1,) * 3, (0.2,) * 3)):
         with pytest.raises(StudyError, match="not inside its box"):
             first_surface(Shape("egg", BALL.level, low, high, cell=0.01))
-
-
-def test_gradient_and_normals_are_those_of_the_ball():
-    x = np.random.default_rng(0).normal(size=(30, 3))
-    radial = x / np.linalg.norm(x, axis=1, keepdims=True)
-    assert gradient(BALL.level, 0.05 * radial, 1e-7) == pytest.approx(radial, abs=1e-8)
-    assert normals(BALL, 0.05 * radial) == pytest.approx(radial, abs=1e-8)
-
-
-def test_projection_meets_two_surfaces_at_once():
-    x = np.random.default_rng(1).uniform(-0.03, 0.03, size=(40, 3)) + np.array([0.04, 0.04, 0.0])
-    on = project(BALL, x, (lambda p: p[:, 2] - 0.01,))
-    assert np.abs(np.linalg.norm(on, axis=1) - 0.05).max() < 1e-13 and np.abs(on[:, 2] - 0.01).max() < 1e-13
-    with pytest.raises(StudyError, match="could not be brought onto the surface"):
-        project(BALL, x, (lambda p: p[:, 2] - 0.2,))  # a plane that misses the ball
-
-
-def test_blends_have_their_limits():
-    a, b = np.array([-3.0, 1.0, 50.0]), np.array([2.0, 1.0, -50.0])
-    assert smooth_min(a, b, 0.0) == pytest.approx(np.minimum(a, b))
-    assert smooth_max(a, b, 0.0) == pytest.approx(np.maximum(a, b))
-    assert smooth_min(a, b, 2.0)[1] == pytest.approx(0.0) and smooth_max(a, b, 2.0)[1] == pytest.approx(2.0)
-    x = np.random.default_rng(2).normal(size=(20, 3))
-    assert ellipsoid(x, (0, 0, 0), (2, 2, 2)) == pytest.approx(np.linalg.norm(x, axis=1) - 2, rel=1e-12)
-    tip = np.array([[3.0, 0, 0], [0, 0, 0]])
-    level = ellipsoid(tip, (0, 0, 0), (3, 1, 2))
-    assert level[0] == pytest.approx(0.0, abs=1e-12) and np.isfinite(level[1])
-    press = groove(np.array([[0.0, 0, 0], [0.5, 2, 0], [9, 0, 0]]), (0, 0, 0), (1, 0, 0), width=2.0, depth=5.0)
-    assert press == pytest.approx([5.0, 5.0 / np.e, 5.0 * np.exp(-16)])
 
 
 @pytest.mark.parametrize("change", [1, 4, -1, -4])

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from studies.base.errors import StudyError
 from studies.geometry.mesh.organ_mesh import unique_edges
 from studies.geometry.mesh.quality import triangle_radius_ratio
 from studies.geometry.shape.levelset import Shape, project
@@ -113,11 +112,6 @@ def test_a_node_that_folds_the_surface_is_refused():
     points = np.array([[0, 0, 0], [1, 0, 0], [0.5, 1, 0], [0.5, 0.9, 0.1], [0.5, -1, 0]], float)
     assert folds(points, np.array([[0, 1, 2], [1, 0, 3]]), 3)
     assert not folds(points, np.array([[0, 1, 2], [1, 0, 4]]), 4)
-
-
-def test_an_outline_that_cannot_be_laid_is_refused(truth, coarse):
-    with pytest.raises(StudyError, match="no length"):
-        fitted(SHAPE, coarse, len(coarse[0]) + 10, [HalfSpace((0, 0, 0), (0, 0, 0))], truth, True)
 
 
 def test_all_four_sides_around_a_new_node_may_turn(truth):

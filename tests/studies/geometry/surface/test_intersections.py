@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from studies.geometry.surface.intersections import crossing_triangles, orientation, orientation_2, overlapping_boxes
-from tests.studies.geometry.boxes import box, split, together
+from tests.studies.geometry.boxes import box, split
 
 ROT = np.linalg.qr(np.random.default_rng(5).normal(size=(3, 3)))[0]
 
@@ -136,12 +136,3 @@ def pierces(p, q, t):
     u, v, d = t[1] - t[0], t[2] - t[0], q - p
     x = np.linalg.solve(np.stack([u, v, -d], axis=1), p - t[0])
     return bool(x[0] >= 0 and x[1] >= 0 and x[0] + x[1] <= 1 and 0 <= x[2] <= 1)
-
-
-def test_overlapping_parts_cross_along_a_curve():
-    points, faces = together(split(*box(), times=2), split(*box((0.51, 0.52, 0.53), (1.5, 1.5, 1.5)), times=2))
-    pairs = crossing_triangles(points, faces)
-    half = len(faces) // 2
-    assert len(pairs) and ((pairs < half).sum(axis=1) == 1).all()
-    where = points[faces[pairs]].mean(axis=(1, 2))
-    assert (where > 0.4).all() and (where < 1.25).all()
