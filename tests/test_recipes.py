@@ -235,7 +235,7 @@ def test_an_added_organ_keeps_the_contract(recipe, monkeypatch):
     make = recipe("organ").egg_shape
     monkeypatch.setitem(SHAPES, "egg", make)
     fine = {"egg": first_surface(replace(make(), cell=4 * test_shapes.MM))}
-    assert hold(test_shapes, "name", name=["egg"], fine=[fine]) == 6
+    assert hold(test_shapes, "name", name=["egg"], fine=[fine]) == 4
 
 
 def test_an_added_law_keeps_the_contract(recipe, add):

@@ -42,8 +42,8 @@ def graded_mesh(
     """The scene's organ with `nodes` nodes on its outer surface (within 5 %; mid-side nodes count), with elements
     halved `at_outlines` times at the outlines of held regions and `at_contact` times where obstacles will touch.
 
-    A mesh file that is used unchanged keeps its number of nodes and is halved too. The wall of a hollow organ
-    has one layer. Raises StudyError for a mesh that cannot be made.
+    A mesh file that is used unchanged keeps its number of nodes and is halved too. Raises StudyError for a mesh that
+    cannot be made.
     """
     if not remeshed(scene.organ):
         return mesh_at(scene, nodes, at_outlines, at_contact, quadratic)
@@ -115,11 +115,13 @@ def coarse_level(
         level = max(FEWEST, round(level * nodes / counts[level]))
         if off <= CLOSE or (level in counts and _off(counts, nodes) <= TOLERANCE):
             break
-        if level in counts:
-            level = _untried(level, counts)
+        if level in counts:  # the nearest that was not tried, since the resulting number of nodes varies irregularly
+            step = max(1, level // 50)
+            near = (level + sign * k * step for k in count(1) for sign in (1, -1))
+            level = next(other for other in near if other >= FEWEST and other not in counts)
     if failed is not None and not counts:
         raise failed
-    best = _best(counts, nodes)
+    best = min(counts, key=lambda tried: abs(counts[tried] - nodes))
     if _off(counts, nodes) > TOLERANCE:
         raise StudyError(
             f"scene '{scene.name}': no graded mesh has {nodes} surface nodes; ask for {counts[best]}, the nearest found"
@@ -135,19 +137,8 @@ def check_number(scene: Scene, nodes: object, quadratic: bool) -> None:
         )
 
 
-def _best(counts: dict[int, int], nodes: int) -> int:
-    return min(counts, key=lambda tried: abs(counts[tried] - nodes))
-
-
 def _off(counts: dict[int, int], nodes: int) -> float:
-    return abs(counts[_best(counts, nodes)] / nodes - 1.0)
-
-
-def _untried(level: int, counts: dict[int, int]) -> int:
-    """The nearest level that was not tried, since the resulting number of nodes varies irregularly."""
-    step = max(1, level // 50)
-    near = (level + sign * k * step for k in count(1) for sign in (1, -1))
-    return next(other for other in near if other >= FEWEST and other not in counts)
+    return min(abs(count / nodes - 1.0) for count in counts.values())
 
 
 def outer_nodes(body: HeldMesh, quadratic: bool) -> int:

@@ -29,9 +29,7 @@ one mesh may cut off a held end of the organ, and the next finer one not."""
 
 def tell_shape(scene: Scene, mesh: OrganMesh | QuadraticMesh, filled: bool) -> None:
     """Warns, in one sentence, of a body beyond the bounds of studies.meshing.bounds. filled: whether the body is the
-    tissue; otherwise it is what the outer surface encloses.
-
-    Raises StudyError if the area of a held region deviates by more than REFUSED_AREA."""
+    tissue. Raises StudyError if the area of a held region deviates by more than REFUSED_AREA."""
     faults = []
     # Triangles of a file that is used unchanged have its exact shape.
     if remeshed(scene.organ):

@@ -16,10 +16,9 @@ from studies.meshing.bounds import HELD_AREA
 from studies.meshing.held_mesh import HeldMesh, held_mesh, rim_sides
 from studies.meshing.kept_shape import area_error, level_that_holds
 from studies.meshing.opened_mesh import opened_elements
-from studies.meshing.outlines import drawn_middles
 from studies.meshing.reference_mesh import on_true_sides
 from studies.meshing.scene_mesh import mesh_for
-from studies.meshing.shaping import aimed, laid_out
+from studies.meshing.shaping import aimed, drawn_middles, laid_out
 from studies.meshing.true_shape import true_shape
 from studies.scene.organ_file import remeshed
 from studies.scene.scene import Scene
@@ -152,11 +151,9 @@ def at_nodes(mesh: MeshTet | MeshTet2, of_elements: np.ndarray) -> np.ndarray:
 
 
 def base_mesh(scene: Scene, surface_nodes: int, at_contact: int) -> NestedMesh:
-    """The coarsest mesh of a family: with `surface_nodes`, or up to MORE times as many if a held region loses area.
-    Halving does not restore a lost end of a region, and an organ held by too small a region turns too far.
-
-    Raises StudyError for one that cannot be made, or that still loses more than bodies may.
-    """
+    """The coarsest mesh of a family: with `surface_nodes`, or up to MORE times as many if a held region loses area:
+    halving does not restore a lost end of it. Raises StudyError for one that cannot be made, or that still loses more
+    than bodies may."""
     if not remeshed(scene.organ):
         return _base_mesh(scene, surface_nodes, at_contact)
     lost = lambda level: _base_mesh(scene, level, at_contact).lost_area  # noqa: E731

@@ -22,9 +22,8 @@ def reference_mesh(scene: Scene, level: float) -> tuple[MeshTet2, list[np.ndarra
     """The second-order mesh on one level of the scene's plan, the nodes of each of its held regions, and the middles of
     the corners of the lumen's facets [m], (f, 3).
 
-    A region is held at the nodes of its facets: a mid-side node outside them, across a dent, stays free. reference_fem
-    checks folding at integration points; the bound of the mesher is stricter. Raises StudyError for a mesh that cannot
-    be made.
+    A region is held at the nodes of its facets: a mid-side node outside them, across a dent, stays free. Raises
+    StudyError for a mesh that cannot be made.
     """
     if scene.symmetric:
         return _curved_octant(scene, straight(_octant(scene, level))), [], np.empty((0, 3))
@@ -37,11 +36,8 @@ def reference_mesh(scene: Scene, level: float) -> tuple[MeshTet2, list[np.ndarra
 
 def on_true_sides(scene: Scene, organ_mesh: OrganMesh, coarse: HeldMesh, body: HeldMesh) -> MeshTet2:
     """The second-order mesh of `body`, as curved as the coarse one, which follows the true shape; straight if only a
-    mesh is known. Raises StudyError.
-
-    Scans, and a few organs of a population, have margins and folds that no coarse element can follow: where an element
-    would fold, its sides are curved less.
-    """
+    mesh is known. Where an element would fold (scans, a few organs of a population), its sides are curved less. Raises
+    StudyError."""
     shape, mesh = true_shape(scene.organ), MeshTet2.from_mesh(body.mesh)
     if shape is None:
         return mesh
@@ -55,7 +51,6 @@ def on_true_sides(scene: Scene, organ_mesh: OrganMesh, coarse: HeldMesh, body: H
 
 
 def _folds(mesh: MeshTet2) -> bool:
-    """Whether reference_fem rejects an element of the mesh."""
     try:
         check_neighbours(mesh)
     except SolveError:

@@ -9,12 +9,11 @@ from skfem import MeshTet2
 from reference_fem import facet_nodes, nodes
 from reference_fem.elements.shapes import edge_index
 from studies.base.errors import StudyError
-from studies.geometry import OrganMesh, curved
+from studies.geometry import CurvedMesh, OrganMesh, curved
 from studies.geometry.mesh.organ_mesh import tetrahedron_volumes, turn_inverted
 from studies.geometry.mesh.quality import PAIRS, tetrahedron_radius_ratio
 from studies.geometry.shape.levelset import Shape, at_depth, project
 from studies.meshing.held_mesh import HeldMesh, rim_sides
-from studies.meshing.outlines import drawn_middles
 from studies.meshing.quadratic_mesh import TURNED, QuadraticMesh, uprightness
 from studies.meshing.retreat import Measure, retreat
 from studies.meshing.true_shape import as_curved, in_cut_planes, on_true_shape, true_shape
@@ -25,18 +24,15 @@ OFF = 1e-3
 
 
 def linear_mesh(scene: Scene, organ_mesh: OrganMesh, coarse: HeldMesh, fine: HeldMesh) -> OrganMesh:
-    """The finer mesh with its vertices on the true shape, those of rims on the true outline. Raises StudyError.
-
-    The mesh of a file is not changed: its flat sides already enclose the volume of the file's surface.
-    """
+    """The finer mesh with its vertices on the true shape, those of rims on the true outline; that of a file is not
+    changed, whose flat sides already enclose the volume of the file's surface. Raises StudyError."""
     cells, shape = upright_cells(fine)[:, :4], None if scene.organ.shape == "file" else true_shape(scene.organ)
     points = nodes(fine.mesh)[: fine.mesh.nvertices]
     if shape is not None and fine is not coarse:
         aim = aimed(scene, fine, shape, laid_out(scene, organ_mesh, coarse, fine, shape))[: len(points)]
         points = moved_vertices(points, aim, cells, organ_mesh.name)
         tell(organ_mesh.name, points, aim)
-    order, outer_count, surface_count = boundary_first(fine, cells)
-    new = inverse(order)
+    order, new, outer_count, surface_count = boundary_first(fine, cells)
     *held, outer, lumen = (facets[:, :3] for facets in all_facets(fine))
     return replace(
         organ_mesh,
@@ -53,11 +49,8 @@ def linear_mesh(scene: Scene, organ_mesh: OrganMesh, coarse: HeldMesh, fine: Hel
 def quadratic_mesh(
     scene: Scene, organ_mesh: OrganMesh, coarse: HeldMesh, fine: HeldMesh, share: float
 ) -> QuadraticMesh:
-    """The finer mesh with mid-side nodes, curved if the true shape is known, else with a warning. Mid-side nodes of
-    sides that start at an outline are placed at `share` of the side from it.
-
-    Raises StudyError.
-    """
+    """The finer mesh with mid-side nodes, curved if the true shape is known, else with a warning; those of sides that
+    start at an outline are placed at `share` of the side from it. Raises StudyError."""
     cells, points, shape = upright_cells(fine), nodes(fine.mesh), true_shape(scene.organ)
     if shape is None:
         warnings.warn(
@@ -68,8 +61,7 @@ def quadratic_mesh(
         points = curved_points(scene, organ_mesh, coarse, fine, shape)
     if share != 0.5:
         points = drawn_points(points, fine, share, organ_mesh.name)
-    order, outer_count, surface_count = boundary_first(fine, cells)
-    new = inverse(order)
+    order, new, outer_count, surface_count = boundary_first(fine, cells)
     *held, outer, lumen = all_facets(fine)
     return QuadraticMesh(
         name=organ_mesh.name,
@@ -128,7 +120,6 @@ def with_middles(vertices: np.ndarray, body: HeldMesh) -> np.ndarray:
 
 def moved_vertices(safe: np.ndarray, target: np.ndarray, cells: np.ndarray, name: str) -> np.ndarray:
     """Vertices moved from `safe` towards `target` (v, 3) [m] as far as no tetrahedron (k, 4) becomes much flatter.
-
     Raises StudyError."""
     before = tetrahedron_radius_ratio(safe, cells)
     return moved(safe, target, cells, lambda x, some, which: tetrahedron_radius_ratio(x, some) / before[which], name)
@@ -191,20 +182,16 @@ def all_facets(body: HeldMesh) -> list[np.ndarray]:
     return [*held, table[~np.isin(table[:, :3], lumen).all(axis=1)], lumen]
 
 
-def boundary_first(body: HeldMesh, cells: np.ndarray) -> tuple[np.ndarray, int, int]:
-    """The nodes of `cells` in the order of a body: outer surface, lumen, inside; how many are on the outer surface, and
-    how many on the boundary."""
+def boundary_first(body: HeldMesh, cells: np.ndarray) -> tuple[np.ndarray, np.ndarray, int, int]:
+    """The nodes of `cells` in the order of a body: outer surface, lumen, inside; the new number of each old node; how
+    many are on the outer surface, and how many on the boundary."""
     used = np.unique(cells)
     outer, lumen = (np.intersect1d(facets, used) for facets in all_facets(body)[-2:])
     boundary = np.concatenate([outer, lumen])
-    return np.concatenate([boundary, np.setdiff1d(used, boundary)]), len(outer), len(boundary)
-
-
-def inverse(order: np.ndarray) -> np.ndarray:
-    """New number of each old node, for `order`: the old number of each new one."""
+    order = np.concatenate([boundary, np.setdiff1d(used, boundary)])
     new = np.full(int(order.max()) + 1, -1, np.int64)
     new[order] = np.arange(len(order))
-    return new
+    return order, new, len(outer), len(boundary)
 
 
 def named_patches(scene: Scene, name: str, held: list[np.ndarray], new: np.ndarray) -> dict[str, np.ndarray]:
@@ -227,3 +214,54 @@ def upright_cells(body: HeldMesh) -> np.ndarray:
     corners = turn_inverted(mesh.p.T, mesh.t.T.astype(np.int64))
     middles = edge_index(mesh, corners[:, np.array(PAIRS)].reshape(-1, 2)).reshape(-1, 6)
     return np.concatenate([corners, mesh.nvertices + middles], axis=1)
+
+
+def drawn_middles(points: np.ndarray, mesh: MeshTet2, outlines: np.ndarray, share: float) -> np.ndarray:
+    """Nodes at `points` (n, 3) [m] of a second-order mesh, with the middles of sides that have one end on `outlines`,
+    vertices (v,), at `share` of the side from that end: near it displacement varies as √r. Sides keep their curves.
+
+    A share of ¼ would represent √r exactly (Barsoum, Int. J. Numer. Methods Eng. 10, 1976; for tetrahedra Nejati,
+    Paluszny and Zimmerman, Eng. Fract. Mech. 144, 2015), but it folds elements with curved sides.
+    """
+    on = np.zeros(mesh.nvertices, dtype=bool)
+    on[outlines] = True
+    ends = np.asarray(mesh.edges).T
+    ends = np.where(on[ends[:, :1]], ends, ends[:, ::-1])
+    leaving = on[ends].sum(axis=1) == 1
+    near, far = points[ends].transpose(1, 0, 2)
+    middle = (1 - share) * (1 - 2 * share) * near + share * (2 * share - 1) * far
+    moved = middle + 4 * share * (1 - share) * points[mesh.nvertices :]
+    middles = np.where(leaving[:, None], moved, points[mesh.nvertices :])
+    return np.vstack([points[: mesh.nvertices], middles])
+
+
+def curved_mesh(mesh: OrganMesh, shape: Shape | None = None) -> CurvedMesh:
+    """`studies.geometry.curved`, but where an element would fold, its sides are curved less, and a warning states the
+    deviation. shape: the true shape of a scan, which its recipe does not contain. Raises StudyError as `curved`."""
+    target = curved(mesh, may_fold=True, shape=shape)
+    if target.smallest_jacobian > 0.0:
+        return target
+    straight = target.points.copy()
+    straight[target.cells[:, 4:]] = mesh.points[mesh.tetrahedra[:, np.array(PAIRS)]].mean(axis=2)
+    points = moved(straight, target.points, target.cells, upright_against(straight, target.cells), mesh.name)
+    off = np.linalg.norm(points - target.points, axis=1)
+    boundary = np.isin(np.arange(len(points)), boundary_facets(mesh, target.cells))
+    held = boundary & (off > 0.0)
+    if held.any():
+        warnings.warn(
+            f"{mesh.name}: {int(held.sum())} of {int(boundary.sum())} boundary nodes stay up to "
+            f"{1e3 * off[held].max():.2g} mm off the true shape, or elements would fold; use more nodes",
+            stacklevel=2,
+        )
+    return replace(target, points=points)
+
+
+def boundary_facets(mesh: OrganMesh, cells: np.ndarray) -> np.ndarray:
+    """The boundary of the quadratic elements `cells` (k, 10) of a mesh, (t, 6): corners, then the nodes between first
+    and second, second and third, third and first."""
+    count = len(mesh.points)
+    sides = np.sort(cells[:, np.array(PAIRS)].reshape(-1, 2), axis=1) @ [count, 1]
+    keys, first = np.unique(sides, return_index=True)
+    middles = cells[:, 4:].ravel()[first]
+    pairs = [np.sort(mesh.triangles[:, pair], axis=1) @ [count, 1] for pair in ([0, 1], [1, 2], [2, 0])]
+    return np.column_stack([mesh.triangles, *(middles[np.searchsorted(keys, pair)] for pair in pairs)])

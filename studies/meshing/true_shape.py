@@ -20,10 +20,8 @@ from studies.scene.scene import Held, Organ
 
 
 def true_shape(organ: Organ) -> Shape | None:
-    """The organ as a level function, the same for all its meshes; None for a mesh file that is used unchanged.
-
-    Raises StudyError for an unknown organ, or a file that cannot be read.
-    """
+    """The organ as a level function, the same for all its meshes; None for a mesh file that is used unchanged. Raises
+    StudyError for an unknown organ, or a file that cannot be read."""
     if organ.shape != "file":
         return lookup(organ.shape, SHAPES, "organ")(**organ.parameters)
     if not remeshed(organ):
@@ -36,12 +34,8 @@ def on_true_shape(
     smooth: CurvedMesh, body: HeldMesh, shape: Shape, helds: tuple[Held, ...], cuts: tuple[Cut, ...] = ()
 ) -> MeshTet2:
     """The mesh with the nodes of its boundary on the true surfaces, those of outlines and of the traces of cuts on the
-    true ones.
-
-    smooth: `studies.geometry.curved` of the same vertices and tetrahedra.
-    With a polygon as outline the body would be held over a region that is off by h²/8r, a first-order error of the
-    force.
-    """
+    true ones: a body held over a polygon has a first-order error of the force. smooth: `studies.geometry.curved` of the
+    same cells."""
     mesh = MeshTet2.from_mesh(body.mesh)
     points = nodes(mesh).copy()
     points[mesh.nvertices + edge_index(mesh, smooth.cells[:, np.array(PAIRS)].reshape(-1, 2))] = smooth.points[

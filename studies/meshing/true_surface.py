@@ -63,10 +63,10 @@ _MEASURED: dict[tuple[str, bytes], ShapeErrors] = {}
 
 
 def shape_errors(organ: Organ, sides: Mapping[str, RestSurface], filled: bool) -> ShapeErrors:
-    """Errors of the surfaces of a body at rest, from `rest_surfaces`, relative to those of its organ.
+    """Errors of the surfaces of a body at rest, from `rest_surfaces`, relative to those of its organ; NaN if the
+    surface of the organ is unknown, or if the body has other sides than the organ.
 
-    filled: whether the body is the tissue, so that the lumen of a hollow organ counts; otherwise only the outer surface
-    does. NaN if the surface of the organ is unknown, or if the body has other sides than the organ.
+    filled: whether the body is the tissue, so that the lumen of a hollow organ counts.
     """
     digest = hashlib.sha256(f"{filled}".encode())
     for surface in sides.values():

@@ -95,7 +95,8 @@ def _tissue(mesh: OrganMesh, level: np.ndarray, copies: VirtualNodes) -> Tissue:
     columns = np.concatenate([np.arange(n), ends[:, 0], ends[:, 1]])
     between = coo_array((values, (rows, columns)), shape=(len(places), len(copies.parent))).tocsr()
     _, triangles, tetrahedra, count = surface_first(places, np.concatenate([whole, pieces]))
-    order = _order(np.concatenate([whole, pieces]), tetrahedra, len(places))
+    order = np.empty(len(places), np.int64)
+    order[tetrahedra.ravel()] = np.concatenate([whole, pieces]).ravel()
     number = np.argsort(order)
     shown = replace(
         mesh,
@@ -108,13 +109,6 @@ def _tissue(mesh: OrganMesh, level: np.ndarray, copies: VirtualNodes) -> Tissue:
     )
     pairs = number[of_side[:, parted].T]
     return Tissue(shown, csr_array(between[order]), pairs)
-
-
-def _order(before: np.ndarray, after: np.ndarray, n: int) -> np.ndarray:
-    """The old number of each node, (n,), from cells (k, 4) in old and new numbers."""
-    order = np.empty(n, np.int64)
-    order[after.ravel()] = before.ravel()
-    return order
 
 
 def _ends_on(side: int, cells: np.ndarray, level: np.ndarray, edges: np.ndarray, copies: VirtualNodes) -> np.ndarray:

@@ -35,8 +35,8 @@ from studies.geometry.files.writing import SURFACES, VOLUMES, check_target, hold
 from studies.geometry.mesh.quality import dihedral_angles
 from studies.geometry.organs import SHAPES
 from studies.meshing.bounds import SHAPE, SHAPE_VOLUME
-from studies.meshing.curved_mesh import boundary_facets, curved_mesh
 from studies.meshing.rest_surface import RestSurface, rest_surfaces
+from studies.meshing.shaping import boundary_facets, curved_mesh
 from studies.meshing.true_surface import ShapeErrors, shape_errors
 from studies.scene.scene import Organ
 from studies.scene.scene_file import organ_options

@@ -83,7 +83,8 @@ def cells_of(mesh: OrganMesh, curved: CurvedMesh | None, tetrahedra: bool) -> me
     for name, nodes in mesh.patches.items():
         data[PATCH + name] = np.zeros(len(points), np.int32)
         data[PATCH + name][nodes] = 1
-    return meshio.Mesh(points, blocks, data, {"part": parts})
+    marks: dict[str, Any] = {"part": parts}
+    return meshio.Mesh(points, blocks, data, marks)
 
 
 def content(mesh: meshio.Mesh, suffix: str) -> bytes:

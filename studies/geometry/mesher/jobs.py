@@ -52,7 +52,9 @@ def mesh_from(
     made = cached(recipe, given, parts, lambda: run_worker(recipe, given | surface_of(recipe), limit))
     mesh = OrganMesh(
         recipe["name"],
-        *(made[part] for part in ("points", "triangles", "tetrahedra")),
+        made["points"],
+        made["triangles"],
+        made["tetrahedra"],
         int(made["surface_count"]),
         recipe=recipe,
         outer_count=int(made["outer_count"]),

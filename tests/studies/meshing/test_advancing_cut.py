@@ -8,8 +8,8 @@ from scipy.spatial import Delaunay
 
 from massspring import MassSpringError
 from massspring.body.opening import opened
-from studies.meshing import advancing_cut
-from studies.meshing.advancing_cut import faces_in_stages
+from studies.meshing import opened_mesh
+from studies.meshing.opened_mesh import faces_in_stages
 from tests.massspring.conftest import block, boundary
 from tests.massspring.cuts import layer_faces
 
@@ -117,7 +117,7 @@ def test_random_sections_open_without_meeting_themselves(seed, inner):
 
 def test_without_waiting_some_surfaces_would_meet_themselves(monkeypatch):
     """The tests above can fail."""
-    monkeypatch.setattr(advancing_cut, "meetings", lambda faces, parting, passed: np.zeros(len(passed), dtype=bool))
+    monkeypatch.setattr(opened_mesh, "meetings", lambda faces, parting, passed: np.zeros(len(passed), dtype=bool))
     faults = set()
     for seed in MEETING:
         cells, faces, along = disc(seed)

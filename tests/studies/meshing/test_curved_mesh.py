@@ -8,9 +8,9 @@ import pytest
 
 from studies.geometry import ball, curved, organ
 from studies.geometry.organs import SHAPES
-from studies.meshing import curved_mesh as module
-from studies.meshing.curved_mesh import boundary_facets, curved_mesh
+from studies.meshing import shaping as module
 from studies.meshing.rest_surface import OUTER, rest_surfaces
+from studies.meshing.shaping import boundary_facets, curved_mesh
 
 ORGANS = [name for name, make in SHAPES.items() if make().literature is not None]
 FOLDED = {("liver", 200), ("spleen", 200)}

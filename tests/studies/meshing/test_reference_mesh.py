@@ -12,8 +12,8 @@ from reference_fem import facet_nodes, nodes
 from reference_fem.elements.shapes import basis_table, element_nodes
 from studies.meshing.held_mesh import rim_sides, with_patches
 from studies.meshing.nested_mesh import SHARE
-from studies.meshing.outlines import drawn_middles
 from studies.meshing.reference_mesh import reference_mesh
+from studies.meshing.shaping import drawn_middles
 from studies.reference.solve import element_size
 from studies.scene.library.ball_clamped import BALL_CLAMPED, CAP, RADIUS
 from studies.scene.library.ball_squeeze import BALL_SQUEEZE
