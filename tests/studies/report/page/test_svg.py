@@ -48,7 +48,9 @@ def test_what_acts_loads_or_covers_is_left_out_and_what_draws_stays(evil):
     assert 'd="M0 0L1 1" style="fill: none; stroke: #112233; clip-path: url(#c-1)"' in text
 
 
-@pytest.mark.parametrize("head", ["onload='alert(1)'", "style='position: fixed; top: 0'", "class='x'"])
+@pytest.mark.parametrize(
+    "head", ["onload='alert(1)'", "style='position: fixed; top: 0'", "style='margin-top: -900px'", "class='x'"]
+)
 def test_the_chart_itself_cannot_act_or_leave_its_place(head):
     root = ElementTree.fromstring(shown("", head))
     assert set(root.attrib) == {"viewBox", "role", "aria-labelledby"}
