@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 from threadpoolctl import threadpool_limits
 
-from massspring import LITERATURE, AngularSprings, ChainMail, ElasticResponse, LinearModes
+from massspring import LITERATURE, ChainMail, ElasticResponse, LinearModes
 from studies.catalog.accuracy import judged_at_rest
 from studies.catalog.literature import LITERATURE_STUDY, literature_cases
 from studies.catalog.study import smoke_case
-from studies.exchange.entry import outside
 from studies.metrics.metrics import METRICS
 from studies.metrics.run import Run
 from studies.runs.case import Case, case_from_json
@@ -73,17 +72,6 @@ def test_metrics_without_a_reference_are_numbers(ran):
 def test_what_a_scene_asks_beyond_them_is_a_skip_with_a_reason(mesh_cache, scene, method, body, sentence):
     record = measure(Case(scene, body, method, dt=0.02))
     assert record.status == Status.SKIPPED and sentence in record.message
-
-
-def test_an_entry_cannot_take_their_names():
-    for kind in LITERATURE:
-        with pytest.raises(Exception, match="is a method of this program"):
-            outside(kind.name)
-
-
-def test_settings_are_part_of_the_name_of_a_case():
-    names = {case.name for case in LITERATURE_STUDY.cases if case.scene == BALL_CLAMPED}
-    assert Case(BALL_CLAMPED, method=AngularSprings(2.0)).name not in names
 
 
 @pytest.mark.parametrize("scene", judged_at_rest(), ids=lambda scene: scene.name)

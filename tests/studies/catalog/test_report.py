@@ -65,26 +65,6 @@ def test_report_writes_everything_and_names_what_is_missing(results):
     assert {path: path.read_bytes() for path in results.rglob("*.*")} == before
 
 
-def test_studies_that_were_not_run_are_named_in_one_line(results):
-    _, remarks = report(
-        Ledger(results), [tiny_study(), *(replace(tiny_study(), name=name) for name in ("other", "third"))]
-    )
-    assert [remark for remark in remarks if "no results here" in remark] == [
-        "skipped (no results here; existing charts kept): other, third. Run `make study-NAME` first"
-    ]
-
-
-def test_references_of_studies_that_were_not_run_are_not_read(results, monkeypatch):
-    read = []
-    monkeypatch.setattr(sweep_load, "reference_for", lambda root, scene: read.append(scene.name))
-    report(Ledger(results), [tiny_study(), VOLUME_LOSS])
-    assert set(read) == {scene.name for scene in tiny_study().scenes}
-
-
-def test_summary_without_results():
-    assert "make study" in results_of([])
-
-
 def test_summary_shows_numbers_or_a_dash(finished_sweep):
     runs, _ = load_runs(finished_sweep, tiny_study())
     kept, free, lost = headline(runs)
@@ -106,17 +86,24 @@ def test_summary_marks_what_the_reference_does_not_know_well_enough(finished_swe
     assert text.endswith("the uncertainty of the reference is more than a tenth of this error")
 
 
-def test_fine_steps_are_no_headline(finished_sweep):
+def test_fine_steps_are_no_headline_and_a_case_that_failed_is_a_dash(finished_sweep):
     runs, _ = load_runs(finished_sweep, tiny_study())
     record = runs[0].record
     fine = replace(record, attributes=record.attributes | {"dt": 0.05 * record.attributes["dt_limit"]})
     assert headline([replace(runs[0], record=fine), runs[1]]) == headline([runs[1]])
-
-
-def test_a_case_that_failed_is_not_left_out(finished_sweep):
-    runs, _ = load_runs(finished_sweep, tiny_study())
-    failed = replace(runs[0].record, attributes={}, fields={}, status=Status.FAILED)
+    failed = replace(record, attributes={}, fields={}, status=Status.FAILED)
     assert headline([replace(runs[0], record=failed)])[0][3:] == ["–"] * 8
+    assert "make study" in results_of([])
+
+
+def test_studies_that_were_not_run_are_one_line_and_their_references_not_read(results, monkeypatch):
+    read = []
+    monkeypatch.setattr(sweep_load, "reference_for", lambda root, scene: read.append(scene.name))
+    _, remarks = report(Ledger(results), [tiny_study(), VOLUME_LOSS, replace(tiny_study(), name="third")])
+    assert [remark for remark in remarks if "no results here" in remark] == [
+        "skipped (no results here; existing charts kept): volume_loss, third. Run `make study-NAME` first"
+    ]
+    assert set(read) == {scene.name for scene in tiny_study().scenes}
 
 
 def test_what_is_shown_already_is_not_drawn_again(results):

@@ -10,7 +10,6 @@ from studies.base.errors import StudyError
 from studies.metrics.timing import cases as timed
 from studies.runs.current import case_path
 from studies.scene.scene import ReferencePlan
-from studies.store.entry import OTHER_VERSION
 from studies.store.ledger import Ledger
 from studies.store.record import Status, read_record, write_record
 from studies.sweep.job import CaseJob, jobs_of
@@ -61,16 +60,6 @@ def age(root, case):
     """Makes the record of a case one of older code."""
     path = case_path(root, "tiny", case)
     write_record(path, replace(read_record(path), fingerprint="0" * 64))
-
-
-def test_older_code_is_stale_and_runs_again(results):
-    study = tiny_study()
-    fresh = content(results / "tiny")
-    age(results, diverging_case())
-    assert counts(results, study) == {"ok": 2, "stale": 1}
-    assert run_studies(results, [study], 1, Silent()) == 1
-    assert counts(results, study) == {"ok": 2, "diverged": 1}
-    assert content(results / "tiny").keys() == fresh.keys()
 
 
 @pytest.mark.parametrize("number", [False, True], ids=["cut off", "another number"])
@@ -141,14 +130,3 @@ def test_a_folder_that_cannot_be_written_to_is_refused_before_anything_runs(tmp_
     monkeypatch.setattr(Local, "map", lambda *_: pytest.fail("nothing may run"))
     with pytest.raises(StudyError, match="choose a folder that can be written to"):
         run_studies(tmp_path / "file", [tiny_study()], 1, Silent())
-
-
-def test_files_of_the_former_layout_run_again_and_share_one_remark(results):
-    study = tiny_study()
-    for case in study.cases:
-        with h5py.File(case_path(results, "tiny", case), "w") as file:
-            file.attrs.update({"schema": 1, "kind": "run", "key": case.key, "name": case.name, "status": "ok"})
-    runs, remarks = load_runs(results, study)
-    assert (runs, len(remarks)) == ([], 1)
-    assert "of an earlier version of organbench" in remarks[0] and remarks[0].endswith("(and 2 more files)")
-    assert {s.message for s in standings(Ledger(results), study)} == {OTHER_VERSION}
