@@ -21,8 +21,8 @@ from studies.catalog import STUDIES, Chart
 from studies.catalog.methods import contestants
 from studies.geometry.organs import SHAPES
 from studies.geometry.surface.first_surface import first_surface
+from studies.lab.methods_page import methods_page
 from studies.metrics.metrics import METRICS
-from studies.report.methods_page import methods_page
 from studies.runs.case import Case, case_from_json
 from studies.runs.recipes import TetrahedralBody
 from studies.runs.run import measure

@@ -25,7 +25,7 @@ from massspring import (
     tetrahedral_body,
 )
 from massspring.methods.capabilities import Capabilities
-from studies.report.methods_page import OPTIONS, methods_page
+from studies.lab.methods_page import OPTIONS, methods_page
 from tests.massspring.conftest import SOFT, block, body_of, hollow_block, icosphere
 from tests.massspring.methods.test_methods import clock_for
 from tests.massspring.quadratic import quadratic_block
@@ -177,4 +177,4 @@ def test_settings_that_support_something_else_say_so_for_themselves_alone():
 
 def test_the_page_of_the_docs_is_the_table():
     page = Path(__file__).parents[3] / "docs" / "methods.md"
-    assert page.read_text(encoding="utf-8") == methods_page(), "run python -m studies.report.methods_page"
+    assert page.read_text(encoding="utf-8") == methods_page(), "run python -m studies.lab.methods_page"
