@@ -15,7 +15,6 @@ from studies.exchange.entry import entries_beside
 from studies.geometry import SHAPES, organ
 from studies.metrics.run import Run
 from studies.metrics.table import metric, study_table
-from studies.report.kept_volume import kept_volumes
 from studies.report.league import write_league
 from studies.report.page.part import read_part, write_part
 from studies.report.page.write import write_page
@@ -103,9 +102,6 @@ def charts_and_tables(ledger: Ledger, studies: Sequence[Study]) -> tuple[list[Pa
     # Not of studies that were never run here: the published references of all scenes take a minute to read and measure.
     present = [study for study in studies if study.name not in absent]
     written += refresh_uncertainty(references, [scene for study in present for scene in study.scenes])
-    kept = kept_volumes(ledger, studies)
-    if len(kept):
-        written.append(write_table(root / "kept_volume.csv", kept))
     if not is_archive(root):
         write_machine(root / "machine.json")
     if absent:

@@ -12,10 +12,11 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from studies import STUDIES, StudyError
+from studies.lab.publish.kept_volume import kept_volumes
 
 PUBLISHED = Path("results/published")
 """The only part of results/ that git keeps."""
-POPULATION = "population"
+POPULATION, KEPT = "population", "kept_volume.csv"
 EXTRAS = {
     POPULATION: "organbench run studies/lab/population/study.py",
     "league": "make study-league",
@@ -24,7 +25,7 @@ EXTRAS = {
     "silicone": "python -m studies.lab.silicone",
     "breaking": "organbench fuzz --cases 10000",
     "reference": "organbench report",
-    "kept_volume.csv": "organbench report",
+    KEPT: "organbench run",
     "summary.md": "organbench report",
     "machine.json": "organbench report",
 }
@@ -54,11 +55,13 @@ def publish(results: Path, names: Sequence[str], target: Path) -> list[Path]:
         if name not in (*catalogue, *EXTRAS):
             raise StudyError(f"nothing makes '{name}'; give a study, or one of {', '.join(EXTRAS)}")
     known = [name for name in (*catalogue, *EXTRAS) if files_of(results, name)]
-    chosen = names or known
+    chosen = names or [*known, KEPT]
     studies = [name for name in chosen if name in catalogue]
     if studies:
         _organbench("run", *studies, "--results", str(results))
     _organbench("report", "--results", str(results))
+    if KEPT in chosen:
+        kept_volumes(results, STUDIES).to_csv(results / KEPT, index=False, float_format="%.6g")
     copies = []
     for name in chosen:
         files = files_of(results, name)

@@ -56,7 +56,7 @@ def test_report_writes_everything_and_names_what_is_missing(results):
     more = tiny_case(dt_fraction=0.4)
     study = tiny_study(cases=(*tiny_study().cases, more))
     written, remarks = report(Ledger(results), [study])
-    assert written == [results / name for name in ("tiny/tiny.csv", "kept_volume.csv", "report.html")]
+    assert written == [results / name for name in ("tiny/tiny.csv", "report.html")]
     assert remarks == [f"tiny: case {more.name} has not run"]
     assert len(pd.read_csv(results / "tiny" / "tiny.csv")) == 3
     assert json.loads((results / "machine.json").read_text())["id"] == machine_id()

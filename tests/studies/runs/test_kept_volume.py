@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from massspring import Capsule, Free, ImplicitVolume, Plane, Sphere, Trajectory
-from studies.report.kept_volume import PROMISED, kept_volumes, promised, worst_volume
+from studies.lab.publish.kept_volume import PROMISED, kept_volumes, promised
+from studies.lab.publish.kept_volume import worst_volume as worst
 from studies.runs.case import Case
 from studies.runs.current import case_path
 from studies.runs.recipes import SurfaceBody, TetrahedralBody
 from studies.runs.run import measure
 from studies.scene.library import BALL_CLAMPED, BALL_SQUEEZE, BLADDER_FILL, JUDGED, LIVER_PRESS
-from studies.store.ledger import Ledger
 from studies.store.record import Status, read_record, write_record
 from tests.studies.tiny import SQUEEZE, bodies_of, diverging_case, tiny_case, tiny_study
 
@@ -28,10 +28,6 @@ def record_of(scene, volumes, kind="tetrahedral"):
     nodes = NODES_OF.get(scene.name, 400 if scene.lumen else 150)
     recipe = SurfaceBody(nodes) if kind == "surface" else TetrahedralBody(nodes, volumes=volumes)
     return measure(Case(scene, recipe, ImplicitVolume(), frames=FRAMES))
-
-
-def worst(record) -> float:
-    return worst_volume(record.fields["volume"].values, record.fields["volume_target"].values)
 
 
 @pytest.mark.parametrize(("scene", "kind"), bodies_of(JUDGED))
@@ -96,9 +92,8 @@ def test_the_promise_covers_the_default_step_from_rest_alone():
 
 
 def test_the_table_is_read_off_the_stored_runs(results):
-
     study = tiny_study()
-    table = kept_volumes(Ledger(results), [study])
+    table = kept_volumes(results, [study])
     (row,) = table.to_dict("records")
     path = case_path(results, "tiny", tiny_case(timed=True))
     record = read_record(path)
@@ -108,6 +103,6 @@ def test_the_table_is_read_off_the_stored_runs(results):
     spoiled[2] *= 1.0002
     fields = record.fields | {"volume": replace(record.fields["volume"], values=spoiled)}
     write_record(path, replace(record, fields=fields))
-    assert kept_volumes(Ledger(results), [study])["at most 1e-4"].tolist() == ["NO"]
-    assert kept_volumes(Ledger(results / "nowhere"), [study]).empty
-    assert kept_volumes(Ledger(results), [tiny_study(cases=(diverging_case(),))]).empty
+    assert kept_volumes(results, [study])["at most 1e-4"].tolist() == ["NO"]
+    assert kept_volumes(results / "nowhere", [study]).empty
+    assert kept_volumes(results, [tiny_study(cases=(diverging_case(),))]).empty

@@ -60,7 +60,7 @@ def test_what_is_in_it_is_what_was_stored_and_what_is_drawn_of_it(organbench, pa
     files = {path.relative_to(unpacked).as_posix(): path for path in unpacked.rglob("*") if path.is_file()}
     records = {case_path(Path(), "tiny", case).as_posix() for case in STUDY.cases}
     frame_times = {timed.timing_file(Path(), "tiny", case).as_posix() for case in STUDY.cases[:2]}
-    drawn = {"tiny/tiny.csv", "tiny/volume.png", "tiny/tiny.h5", "kept_volume.csv", "report.html"}
+    drawn = {"tiny/tiny.csv", "tiny/volume.png", "tiny/tiny.h5", "report.html"}
     about = {"README.md", "CITATION.cff", "constraints.txt", "machine.json", archived.CRATE, archived.MANIFEST}
     assert {name for name in files if not name.startswith("code/")} == records | frame_times | drawn | about
     for name in records:
