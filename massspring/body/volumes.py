@@ -20,35 +20,22 @@ from massspring.kernels.forces.volume import tetrahedron_volumes_into
 
 DEPENDENT = 1e-8
 """Relative residual below which a volume is a sum of others; independent ones of a mesh leave more than 1e-4."""
-
-
 PATCH = 8
 """Most nodes of a patch. The inside of a larger patch would be too soft for springs without length, whose bulk modulus
 there is −mu/3."""
 
 
 class Solid(Protocol):
-    """What volumes are made of: a body, or any other mesh with these arrays."""
+    """What volumes are made of: the arrays of a `Body`, or of any other mesh that has them."""
 
     @property
-    def rest(self) -> np.ndarray:
-        """Rest positions [m], (n, 3)."""
-        ...
-
+    def rest(self) -> np.ndarray: ...
     @property
-    def triangles(self) -> np.ndarray:
-        """Closed surface, outward, (f, 3) uint32."""
-        ...
-
+    def triangles(self) -> np.ndarray: ...
     @property
-    def tetrahedra(self) -> np.ndarray:
-        """(k, 4) uint32, positive; (0, 4) where there are none."""
-        ...
-
+    def tetrahedra(self) -> np.ndarray: ...
     @property
-    def share(self) -> np.ndarray | None:
-        """Part of each tetrahedron that is tissue, (k,); None: all of each."""
-        ...
+    def share(self) -> np.ndarray | None: ...
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,13 +10,13 @@ from massspring.body.body import Body
 from massspring.kernels.arrays.layout import BoundaryConditions, Contacts, Nodes, Push
 from massspring.kernels.forces.elements import Elements
 from massspring.kernels.forces.springs import spring_energy, spring_forces_into
-from massspring.kernels.jit.stage_clock import HELD, INTEGRATION, MULTIPLIER, REVISION, SPRINGS, end_stage
+from massspring.kernels.jit.stage_clock import HELD, MULTIPLIER, REVISION, SPRINGS
 from massspring.kernels.step.end import add_held_impulse
 from massspring.layout.state import State
 from massspring.methods.elements.friction import RubbedContact
 from massspring.methods.elements.laws import Law
 from massspring.methods.elements.tangent import Pattern, Tangent, target_ratios
-from massspring.methods.implicit.contact import TouchedRows
+from massspring.methods.implicit.contact import LongStep, TouchedRows
 
 REVISIONS = 12
 """Most revisions of the touched set in one pass; if it still changes, the next pass continues."""
@@ -89,34 +89,26 @@ class Ending(NamedTuple):
     most: int
 
 
-class NewtonStep:
-    """One step during its computation."""
+class NewtonStep(LongStep):
+    """A step of elastic elements."""
 
     def __init__(self, state: State, boundary: BoundaryConditions, step: int) -> None:
-        self.state, self.boundary = state, boundary
-        self.model, self.nodes, self.contacts = state.model, state.nodes, state.contacts
+        super().__init__(state, boundary, step)
+        self.state = state
         self.prepared: Prepared = state.memory
         filling = boundary.volume_target[step] / self.prepared.body.rest_volumes
         self.elements = with_targets(self.prepared, filling)
         self.weight = self.prepared.body.mass[:, None] * boundary.gravity
         """m g of all nodes [N], (n, 3)."""
-        # The start is predicted without gravity, so that a body in equilibrium starts at its solution.
-        self.p = self.nodes.x + boundary.dt * self.nodes.v
-        held = self.model.held_nodes
-        self.p[held] = self.model.held_rest + boundary.held_displacement[step][self.model.held_group]
         closer = TOUCHING * self.model.correction_limit
         self.contact = RubbedContact(self.model, self.nodes, self.contacts, boundary, step, closer)
         self.contact.resistance = self.prepared.resistance(state, boundary)
         self.force, self.right = np.zeros_like(self.p), np.zeros_like(self.p)
         self.rough = boundary.rough
 
-    def end_stage(self, stage: int) -> None:
-        """Adds the time since the last stage ended to this one, if stages are timed."""
-        end_stage(self.state.diagnostics.stage_times, stage)
-
     def take(self, ending: Ending) -> None:
         """Makes passes until one moves no node by more than the tolerance; then v⁺ = (x⁺ − x)/dt."""
-        boundary, diagnostics = self.boundary, self.state.diagnostics
+        diagnostics = self.diagnostics
         rows, impulses, count, settled = None, np.zeros(0), 0, False
         while not settled and count < ending.most and np.isfinite(self.p).all():
             if rows is not None:
@@ -128,15 +120,12 @@ class NewtonStep:
             settled = agreed and part == 1.0 and not np.abs(change).max() > ending.tolerance
             count += 1
             self.end_stage(MULTIPLIER)
-        diagnostics.iterations[0] += count
-        diagnostics.iterations[1] = max(int(diagnostics.iterations[1]), count)
+        self.count_passes(count)
         diagnostics.limited[0] += not settled
         if rows is not None:
             self.contact.book(rows, impulses, diagnostics.contact_impulse)
         self.book_held()
-        self.nodes.v[:] = (self.p - self.nodes.x) / boundary.dt
-        self.nodes.x[:] = self.p
-        self.end_stage(INTEGRATION)
+        self.end()
 
     def newton_pass(self) -> tuple[np.ndarray, Rows, np.ndarray, bool]:
         """(δ [m], contact rows, their impulses γ [kg m], whether the touched set is final) of one linear step from
@@ -225,7 +214,7 @@ class NewtonStep:
         """Records the impulses of attachments [N s] at the end of the step (eq. 3.6), and whether a volume had no
         gradient."""
         self.imbalance()
-        model, nodes, diagnostics = self.model, self.nodes, self.state.diagnostics
+        model, nodes, diagnostics = self.model, self.nodes, self.diagnostics
         diagnostics.singular[0] += self.idle
         # Gravity acts on the mass of the body, not on the inertial mass.
         nodes.force[:] += self.weight - model.mass[:, None] * self.boundary.gravity

@@ -1,4 +1,5 @@
-"""Contact for long steps: the directions that obstacles remove from nodes, and their impulses (eq. 3.8, 12.3, 12.4)."""
+"""Long steps, solved as a whole: their start and end, and the directions and impulses of obstacles (eq. 3.8, 12.3,
+12.4)."""
 
 import numpy as np
 from scipy.linalg import get_lapack_funcs
@@ -7,13 +8,44 @@ from massspring.kernels.arrays.layout import BoundaryConditions, Contacts, Model
 from massspring.kernels.contact.active_set import release_all
 from massspring.kernels.contact.friction import activate_edges
 from massspring.kernels.contact.node_contact import FREE, HIDDEN, ON_EDGE, SLIDES, STICKS
+from massspring.kernels.jit.stage_clock import INTEGRATION, end_stage
 from massspring.kernels.step.implicit_step import activate_entering
+from massspring.layout.state import State
 from massspring.methods.implicit.factor import Factor
 
 FACTORED, SOLVED = get_lapack_funcs(("potrf", "potrs"), dtype=np.float64)
 SLIP_RESOLUTION = 1e-11
 """Slip in a step, over the correction limit of 0.3 of an edge, below which a node does not slide. A sticking node has a
 measured slip of 1e-15 to 1e-14 from round-off of the solve, which must not set the direction of friction."""
+
+
+class LongStep:
+    """A step that is solved as a whole, in passes that move p; arrays of the state serve as scratch."""
+
+    def __init__(self, state: State, boundary: BoundaryConditions, step: int) -> None:
+        self.boundary, self.step = boundary, step
+        self.model, self.nodes, self.contacts = state.model, state.nodes, state.contacts
+        self.diagnostics = state.diagnostics
+        # The start is predicted without gravity: passes that start in equilibrium must stay there, or few passes would
+        # be biased.
+        self.p = self.nodes.x + boundary.dt * self.nodes.v
+        held = self.model.held_nodes
+        self.p[held] = self.model.held_rest + boundary.held_displacement[step][self.model.held_group]
+
+    def end_stage(self, stage: int) -> None:
+        """Adds the time since the last stage ended to this one, if stages are timed."""
+        end_stage(self.diagnostics.stage_times, stage)
+
+    def count_passes(self, count: int) -> None:
+        """Records iterations of the step."""
+        self.diagnostics.iterations[0] += count
+        self.diagnostics.iterations[1] = max(int(self.diagnostics.iterations[1]), count)
+
+    def end(self) -> None:
+        """v⁺ = (x⁺ − x)/dt, x⁺ = p."""
+        self.nodes.v[:] = (self.p - self.nodes.x) / self.boundary.dt
+        self.nodes.x[:] = self.p
+        self.end_stage(INTEGRATION)
 
 
 class TouchedRows:

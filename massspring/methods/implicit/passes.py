@@ -9,21 +9,12 @@ from massspring.kernels.arrays.layout import Accuracy, BoundaryConditions, Push
 from massspring.kernels.arrays.volume_rows import VolumeRows
 from massspring.kernels.constraint.jacobian import rows_into, rows_times_into, transposed_rows_times_into
 from massspring.kernels.forces.springs import spring_forces_into
-from massspring.kernels.jit.stage_clock import (
-    HELD,
-    INTEGRATION,
-    MULTIPLIER,
-    REVISION,
-    SEARCH,
-    SPRINGS,
-    VOLUME,
-    end_stage,
-)
+from massspring.kernels.jit.stage_clock import HELD, MULTIPLIER, REVISION, SEARCH, SPRINGS, VOLUME
 from massspring.kernels.step.end import add_held_impulse
 from massspring.kernels.step.implicit_step import imbalance_into
 from massspring.layout.jacobian_pattern import DENSE_UP_TO
 from massspring.layout.state import State
-from massspring.methods.implicit.contact import ActiveSet, Contact
+from massspring.methods.implicit.contact import ActiveSet, Contact, LongStep
 from massspring.methods.implicit.factor import Factor
 
 CONTACT_REVISIONS, LAST_REVISIONS = 3, 12
@@ -37,21 +28,15 @@ SOFTNESS = 1e-10
 corrects the residual."""
 
 
-class Step:
-    """One step during its computation; arrays of the state serve as scratch."""
+class Step(LongStep):
+    """A step of implicit springs."""
 
     def __init__(
         self, state: State, boundary: BoundaryConditions, step: int, factor: Factor, accuracy: Accuracy
     ) -> None:
         assert isinstance(state.rows, VolumeRows)  # start() made them
-        self.boundary, self.step, self.factor, self.accuracy = boundary, step, factor, accuracy
-        self.model, self.nodes, self.contacts = state.model, state.nodes, state.contacts
-        self.rows, self.diagnostics = state.rows, state.diagnostics
-        # The start is predicted without gravity: passes that start in equilibrium must stay there, or few passes would
-        # be biased.
-        self.p = self.nodes.x + boundary.dt * self.nodes.v
-        held = self.model.held_nodes
-        self.p[held] = self.model.held_rest + boundary.held_displacement[step][self.model.held_group]
+        super().__init__(state, boundary, step)
+        self.rows, self.factor, self.accuracy = state.rows, factor, accuracy
         self.few = len(self.rows.lam) <= DENSE_UP_TO
         self.target = boundary.volume_target[step]
         """Targets of the volumes at the end of the step [m³], (m,); nearer to the current volumes if these are far
@@ -74,10 +59,6 @@ class Step:
         force = np.empty_like(self.p)
         transposed_rows_times_into(self.rows, pressure, force)
         return force
-
-    def end_stage(self, stage: int) -> None:
-        """Adds the time since the last stage ended to this one, if stages are timed."""
-        end_stage(self.diagnostics.stage_times, stage)
 
     def take(self, passes: int) -> None:
         """Makes `passes` passes; then v⁺ = (x⁺ − x)/dt."""
@@ -109,9 +90,7 @@ class Step:
         self.diagnostics.singular[0] += self.idle
         self.book(active, impulses)
         self.end_stage(HELD)
-        self.nodes.v[:] = (self.p - self.nodes.x) / self.boundary.dt
-        self.nodes.x[:] = self.p
-        self.end_stage(INTEGRATION)
+        self.end()
 
     def revised(self, free: np.ndarray, active: ActiveSet, most: int) -> tuple[np.ndarray, np.ndarray, ActiveSet]:
         """Change of the positions, contact impulses, and the active set of both, after at most `most` solves."""
@@ -214,8 +193,7 @@ class Step:
             step = rho / float(search @ image)
             pressure, answer, residual = pressure + step * search, answer + step * response, residual - step * image
             before, count = rho, count + 1
-        self.diagnostics.iterations[0] += count
-        self.diagnostics.iterations[1] = max(int(self.diagnostics.iterations[1]), count)
+        self.count_passes(count)
         return pressure, answer
 
     def book(self, active: ActiveSet, impulses: np.ndarray) -> None:
