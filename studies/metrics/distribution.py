@@ -118,7 +118,6 @@ class Group:
         )
 
     def of(self, entry: Metric) -> Distribution:
-        """The distribution of a metric."""
         return distribution(*self.values(entry))
 
 

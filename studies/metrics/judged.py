@@ -28,7 +28,6 @@ class Measured(NamedTuple):
 
     @property
     def known(self) -> bool:
-        """Whether the number is not NaN."""
         return self.value == self.value
 
 
@@ -68,7 +67,6 @@ class Judged:
 
     @property
     def compared(self) -> bool:
-        """Whether one of its errors is known."""
         return self.force.known or self.displacement.known
 
     @property

@@ -34,7 +34,6 @@ class Metric:
 
     @property
     def description(self) -> str:
-        """First line of the function's docstring."""
         return (self.of.__doc__ or "").strip().split("\n")[0]
 
     def __call__(self, run: Run) -> float:
@@ -61,7 +60,6 @@ class Metric:
         )
 
     def _allowed(self, run: Run) -> bool:
-        """Whether there is a reference, and the scene allows the comparison."""
         if self.quantity is None or self.quantity in ALWAYS:
             return True
         return run.reference is not None and allowed(run.case.scene, self.quantity)

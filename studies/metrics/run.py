@@ -271,7 +271,6 @@ def doubled(points: np.ndarray, facets: np.ndarray, size: float) -> np.ndarray:
 
 
 def by_scene(runs: Sequence[Run]) -> dict[str, list[Run]]:
-    """Runs of each scene, in the order in which they come."""
     groups: dict[str, list[Run]] = {}
     for run in runs:
         groups.setdefault(run.case.scene.name, []).append(run)

@@ -59,7 +59,6 @@ class Verdict(NamedTuple):
 
 
 def apart(coarse: Run, fine: Run) -> Apart:
-    """The difference of the coarse body from the fine one."""
     scene = fine.case.scene
     force = displacement = float("nan")
     if allowed(scene, "force_end"):

@@ -45,7 +45,6 @@ STRUCK_OUT = {"marker": "x", "linestyle": "", "color": BLACK, "markersize": 11, 
 
 @styled
 def figure(runs: Sequence[Run]) -> Figure:
-    """One panel per scene, one group of points per quantity."""
     shown = [run for run in runs if has_frames(run)]
     if not shown:
         return blank(TITLE, "no run has recorded a frame yet")

@@ -21,7 +21,6 @@ Row = tuple[str, str, Ratio]
 
 @styled
 def figure(runs: Sequence[Run]) -> Figure:
-    """One row per body and method."""
     rows = ratios(runs)
     if not rows:
         return blank(TITLE, "no body has been timed with and without a constraint by this machine and this code yet")

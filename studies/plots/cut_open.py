@@ -43,7 +43,6 @@ def incised(run: Run) -> bool:
 
 @styled
 def figure(runs: Sequence[Run]) -> Figure:
-    """One row per scene: the body with the smallest opening error, before and after the cut, and the reference."""
     scenes = by_scene([run for run in runs if incised(run)])
     if not scenes:
         return blank(TITLE, "no run of a scene with an incision and a reference has ended yet")

@@ -46,7 +46,6 @@ LABEL_GAP = 0.085
 
 @styled
 def figure(runs: Sequence[Run]) -> Figure:
-    """One panel per scene, with the error at the last checkpoint at the end of each line."""
     shown = [run for run in runs if has_frames(run) and "force" in run.case.scene.quantities]
     if not shown:
         return blank(TITLE, "no run of a scene that asks for a force has recorded a frame yet")
@@ -115,7 +114,6 @@ def _motion(scene: Scene) -> Trajectory:
 
 
 def _error(run: Run) -> str:
-    """The label at the end of a line: the error, without a reference the force, or the status of a failed run."""
     if run.record.status not in COMPARABLE:
         return str(run.record.status)
     if run.reference is None:
@@ -124,7 +122,6 @@ def _error(run: Run) -> str:
 
 
 def _label(axes: Axes, ends: Sequence[tuple[float, str, str]], low: float, top: float) -> None:
-    """Writes the errors to the right of the axis, one under the other if lines end close together."""
     # A diverging line ends outside the axis; its label stays at the border.
     forces = np.array([force if np.isfinite(force) else top for force, _, _ in ends])
     heights = (np.clip(forces, low, top) - low) / (top - low)

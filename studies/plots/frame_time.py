@@ -27,7 +27,6 @@ NS_PER_MS = 1e6
 
 @styled
 def figure(runs: Sequence[Run]) -> Figure:
-    """One panel per body with the history of its frame times, and all percentiles below."""
     timed = [(run, run.timing) for run in runs if run.timing is not None]
     if not timed:
         return blank(TITLE, "no frame times from this machine and this code yet")
@@ -55,7 +54,6 @@ def figure(runs: Sequence[Run]) -> Figure:
 
 
 def _untimed(runs: Sequence[Run]) -> list[Run]:
-    """Runs that should have frame times and have none, for the notes."""
     return [run for run in runs if run.timing is None and run.case.timed]
 
 
@@ -90,7 +88,6 @@ def _label_deadlines(axes: Axes) -> None:
 
 
 def _names(runs: Sequence[Run]) -> dict[int, str]:
-    """id of a run -> its scene, body and surface nodes in words."""
     looks = body_looks(runs, ignored=("nodes",))
     return {
         id(run): f"{heading(run.case.scene.name)}, {looks[run.case.body].name}, {run.case.body.nodes:,}" for run in runs
@@ -100,7 +97,6 @@ def _names(runs: Sequence[Run]) -> dict[int, str]:
 def _draw_percentiles(
     axes: Axes, bodies: Sequence[Sequence[Run]], span: tuple[float, float], names: dict[int, str]
 ) -> None:
-    """Draws one line per case from the median to the slowest frame, with markers of the percentiles."""
     labels: list[str] = []
     for body in bodies:
         for place, run in enumerate(body):

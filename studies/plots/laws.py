@@ -65,7 +65,6 @@ FORCE, MS_PER_S = "force_end", 1e3
 
 @styled
 def figure(runs: Sequence[Run]) -> Figure:
-    """One row per scene: force error left, step limit right; a line joins the meshes of one law and kind of volumes."""
     shown = [run for run in runs if run.record.status in COMPARABLE]
     if not shown:
         return blank(TITLE, "no run has finished yet")
@@ -113,7 +112,6 @@ def _law(run: Run) -> str:
 
 
 def _draw_lines(axes: Axes, group: Sequence[Run], value: Callable[[Run], float], looks: dict[int, Look]) -> int:
-    """Draws finite values over the surface nodes; returns the number of points drawn."""
     drawn = 0
     for same in grouped(group, lambda run: looks[id(run)]):
         points = sorted((run.case.body.nodes, value(run)) for run in same if np.isfinite(value(run)))

@@ -37,7 +37,6 @@ SHUT = 1e-3
 
 
 def gapes(run: Run) -> bool:
-    """Whether a run has ended and its incision with a front is open."""
     if not fronts(run) or run.record.status not in COMPARABLE:
         return False
     return float(run.gap(run.opening).max()) > SHUT * run.size
@@ -50,7 +49,6 @@ def fronts(run: Run) -> list[int]:
 
 @styled
 def figure(runs: Sequence[Run]) -> Figure:
-    """One panel for each incision of a scene."""
     shown = [run for run in runs if gapes(run)]
     if not shown:
         return blank(TITLE, "no run of a scene with an incision has ended yet")

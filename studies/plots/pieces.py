@@ -26,13 +26,11 @@ SMALLEST = 1e-8
 
 
 def parts(run: Run) -> bool:
-    """Whether a run has frames of a body that its cuts divide into pieces."""
     return bool(run.case.scene.cuts) and has_frames(run) and len(np.unique(run.field("cut_parts"))) > 1
 
 
 @styled
 def figure(runs: Sequence[Run]) -> Figure:
-    """One panel per scene, body and method."""
     shown = [run for run in runs if parts(run)]
     if not shown:
         return blank(TITLE, "no run of a body that is cut in pieces has recorded a frame yet")

@@ -19,7 +19,6 @@ COLOURS, MARKERS = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY), "osD^vP"
 
 @styled
 def figure(curves: Sequence[Curve]) -> Figure:
-    """One log-log panel for each group of curves; the legend has the order of each between its two finest meshes."""
     if not curves:
         return blank(TITLE, "no oracle of this run was solved on several meshes")
     names = list(dict.fromkeys(curve.panel for curve in curves))
@@ -48,7 +47,6 @@ def _draw_curve(axes: Axes, curve: Curve, number: int) -> None:
 
 
 def _log_log(axes: Axes, curves: Sequence[Curve]) -> None:
-    """Makes both axes logarithmic, with the sizes of meshes as fractions."""
     axes.set(xscale="log", yscale="log")
     ticks = sorted({size for curve in curves for size in curve.sizes})
     kept: list[float] = []

@@ -103,7 +103,6 @@ def _range(shown: Sequence[Run]) -> tuple[float, float]:
 
 
 def _scale(axes: np.ndarray, lowest: float, highest: float, first: bool) -> None:
-    """Sets the same scale for all scenes; only the `first` of a row has labels at its vertical axes."""
     if len(axes) > 1:
         low, high = min(-1.0, lowest), max(0.5, highest)
         axes[0].set_ylim(1.08 * low, high + 0.04 * (high - low))

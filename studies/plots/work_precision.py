@@ -40,7 +40,6 @@ LOWEST, HIGHEST = 1e-3, 1e3
 
 @styled
 def figure(runs: Sequence[Run]) -> Figure:
-    """For each scene a panel of the force error, and one of the displacement error below it."""
     scenes = {name: _judged(group) for name, group in by_scene(runs).items()}
     scenes = {name: bodies for name, bodies in scenes.items() if bodies}
     if not scenes:
@@ -74,7 +73,6 @@ def figure(runs: Sequence[Run]) -> Figure:
 
 
 def _judged(group: Sequence[Run]) -> list[Judged]:
-    """The judged cases of the runs of a scene whose computing time is known."""
     return [one for one in over_meshes(filter(None, map(judged, group))) if one.cost.known]
 
 
@@ -156,7 +154,6 @@ def _size(look: Family) -> float:
 
 
 def _name(panel: Axes, points: Sequence[tuple[Judged, Measured]], recommended: Judged | None) -> None:
-    """Labels the costliest point of the body of the paper, and labels and circles the recommended case."""
     papers = [(one, error) for one, error in points if family_of(one.case).name == PAPER]
     if papers:
         one, error = max(papers, key=lambda pair: pair[0].cost.value)
@@ -169,7 +166,6 @@ def _name(panel: Axes, points: Sequence[tuple[Judged, Measured]], recommended: J
 
 
 def _write(panel: Axes, one: Judged, error: Measured, words: str, vertical: str) -> None:
-    """Writes words to the right of a point in the left half of the panel, else to its left."""
     left, right = panel.get_xlim()
     in_left = one.cost.value < np.sqrt(left * right)
     panel.annotate(
@@ -187,7 +183,6 @@ def _write(panel: Axes, one: Judged, error: Measured, words: str, vertical: str)
 
 
 def words_of(body: BodyRecipe) -> str:
-    """A recommended body in words: its series and surface nodes."""
     return f"{body.series}, {body.nodes:,} surface nodes"
 
 
@@ -208,7 +203,6 @@ def _notes(scenes: dict[str, list[Judged]]) -> list[str]:
 
 
 def _left_out(runs: Sequence[Run]) -> list[str]:
-    """Notes on the cases that are not in the chart, and why."""
     ended = [f"{run.case.name} {readable(run.record.status)}" for run in runs if run.record.status != Status.OK]
     well = [run for run in runs if run.record.status == Status.OK]
     notes = remarks(well)

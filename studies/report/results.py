@@ -130,17 +130,14 @@ class StudyDrawing:
 
     @cached_property
     def folder(self) -> Path:
-        """Of its charts and its table."""
         return study_folder(self.ledger.root, self.study.name)
 
     @cached_property
     def stamp(self) -> Path:
-        """Names the state that was drawn last, and what was missing then."""
         return self.ledger.root / "cache" / f"{self.study.name}.drawn.json"
 
     @property
     def paths(self) -> list[Path]:
-        """Of all charts and tables."""
         charts = [*(self.folder / chart.file for chart in self.study.charts), self.folder / f"{self.study.name}.csv"]
         return charts + [self.ledger.root / file for file in SUMMARIES.get(self.study.name, ())]
 
@@ -159,7 +156,6 @@ class StudyDrawing:
         return state_of(files, *(entry.written if entry else "-" for entry in others), *names)
 
     def refreshed(self) -> tuple[list[Path], list[str]]:
-        """What `refresh` says."""
         before = _stamped(self.stamp)
         current = before.get("inputs") == self.state and all(path.exists() for path in self.paths)
         if current and read_part(self.ledger.root, self.study) is not None:

@@ -51,7 +51,6 @@ SUMMARY_HEADS = {
 
 
 def _cell(row: Mapping[Hashable, Any], column: str) -> str:
-    """A value with the uncertainty of its reference, or a dash."""
     value = float(row[column])
     if value != value:
         return MISSING
@@ -65,8 +64,6 @@ def _cell(row: Mapping[Hashable, Any], column: str) -> str:
 
 
 class Choice(NamedTuple):
-    """The body that is recommended for a scene."""
-
     wish: Wish
     """The usual target of the scene."""
     body: Judged
@@ -93,7 +90,6 @@ def compared_bodies(runs: Sequence[Run]) -> dict[str, list[Judged]]:
 
 
 def paper_body(bodies: Sequence[Judged]) -> Judged | None:
-    """The paper's body among those of a scene: a surface with one volume."""
     papers = (one for one in bodies if one.case.body.kind == "surface" and one.case.body.nodes == PAPER)
     return next((one for one in papers if one.advisable), None)
 

@@ -90,7 +90,6 @@ class Comparison:
 
     @property
     def moved(self) -> list[Change]:
-        """The changes that are not negligible, accuracy before times."""
         moved = [change for change in self.changes if change.verdict == Verdict.MOVED]
         return sorted(moved, key=lambda change: change.is_time)
 
@@ -102,7 +101,6 @@ class Comparison:
         return float(np.median(ratios)) if ratios else float("nan")
 
     def table(self) -> pd.DataFrame:
-        """A row per change."""
         return pd.DataFrame([change.case._asdict() | _numbers(change) for change in self.changes])
 
     def counts(self, times: bool) -> dict[Verdict, int]:
@@ -154,7 +152,6 @@ def tables_of(folder: Path) -> dict[str, dict[Key, Row]]:
 
 
 def _read(path: Path) -> dict[Key, Row]:
-    """The rows of a table by key; empty if they name no recipe."""
     try:
         table = pd.read_csv(path)
     except (ValueError, OSError) as error:

@@ -27,12 +27,10 @@ WARM_UP = 1.0
 
 
 def timing_file(root: Path, study: str, case: Case) -> Path:
-    """Path of the frame times of a case on this machine."""
     return timing_path(case_path(root, study, case), machine_id())
 
 
 def timing_of(record: Record) -> FrameTiming:
-    """The frame times in the record of a timing file."""
     return FrameTiming(record.fields["frame_ns"].values, record.attributes["core"], record.attributes["threads"])
 
 

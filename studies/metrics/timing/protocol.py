@@ -43,11 +43,9 @@ class FrameTiming:
             raise StudyError(f"stage times need one name per row, not {len(self.stages)} names")
 
     def attributes(self) -> dict[str, int | None]:
-        """The attributes of a timing record."""
         return {"core": self.core, "threads": self.threads, "repeats": len(self.frame_ns)}
 
     def fields(self) -> dict[str, Field]:
-        """The fields of a timing record."""
         values = {"frame_ns": self.frame_ns}
         if self.stage_ns is not None:
             values |= {"stage_ns": self.stage_ns, "stages": np.array(self.stages)}

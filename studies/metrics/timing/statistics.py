@@ -46,7 +46,6 @@ class Ratio:
 
     @property
     def resolvable(self) -> bool:
-        """Whether the difference is larger than the spread: enough repeats, and 1 outside the interval."""
         return self.confidence >= CONFIDENCE and not self.low <= 1.0 <= self.high
 
     def __str__(self) -> str:

@@ -26,7 +26,6 @@ RETURNED = 0.01
 
 @styled
 def figure(runs: Sequence[Run]) -> Figure:
-    """One panel per start."""
     shown = [run for run in runs if has_frames(run) and len(run.fields.tetrahedra)]
     if not shown:
         return blank(TITLE, "no run of a body with tetrahedra has recorded a frame yet")
@@ -70,12 +69,10 @@ def _draw_start(axes: Axes, group: Sequence[Run], looks: dict[BodyRecipe, BodyLo
 
 
 def _colour(case: Case) -> str:
-    """The colour of the method, or CHOSEN for a method with settings other than the defaults."""
     return CHOSEN if chosen_settings(case.method) else method_colour(case.method.name)
 
 
 def _handles(shown: Sequence[Run], looks: dict[BodyRecipe, BodyLook]) -> list[Artist]:
-    """Legend entries for every body and method, with its settings, that occur together."""
     entries = []
     for case in {(looks[run.case.body], run.case.method_words): run.case for run in shown}.values():
         entry = body_handle(looks[case.body], case.method.name)

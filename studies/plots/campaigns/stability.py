@@ -24,7 +24,6 @@ MS = 1e3
 
 @styled
 def figure(runs: Sequence[Run]) -> Figure:
-    """One panel per scene, body and method."""
     placed = [run for run in runs if "dt" in run.record.attributes]
     if not placed:
         return blank(TITLE, "no run yet")
@@ -43,7 +42,6 @@ def figure(runs: Sequence[Run]) -> Figure:
 
 
 def _draw_map(axes: Axes, group: Sequence[Run]) -> None:
-    """Draws a tinted cell and a marker for each run, and the limit as a line."""
     dt = np.array([MS * run.attributes.dt for run in group])
     factor = np.array([run.case.body.stiffness for run in group])
     edges_x, edges_y = _edges(dt), _edges(factor)
@@ -117,7 +115,6 @@ def _handles(placed: Sequence[Run]) -> list:
 
 
 def _size_of(placed: Sequence[Run]) -> list[str]:
-    """A note on the surface nodes, and on how many runs contradict the limit."""
     nodes = sorted({run.case.body.nodes for run in placed})
     below = [run for run in placed if run.attributes.dt < run.attributes.dt_limit]
     broken = sum(run.record.status == Status.DIVERGED for run in below)

@@ -35,7 +35,6 @@ NEAR, FAR = 0.9, 0.16
 
 
 def body_of(mesh: OrganMesh) -> Body:
-    """The body of the paper on the outer surface of a mesh, with the axis of AXIS_WORD."""
     outer = mesh.outer()
     # The springs depend only on the geometry, so any material gives the same picture.
     return surface_body(outer.points, outer.triangles, Material(1000.0, 1000.0), AXIS_WORD.get(mesh.name, "straight"))

@@ -72,7 +72,6 @@ def figure(meshes: Mapping[str, OrganMesh]) -> Figure:
 
 
 def draw_smooth(axes: Axes, shape: Shape, mesh: OrganMesh, colours: Mapping[str, str]) -> None:
-    """Draws the true shape, with the attachments that have a colour."""
     camera = FIRST_SIDES.get(mesh.name, FRONT)
     points, triangles = first_surface(replace(shape, cell=shape.size / FINE))
     own = uniform(TISSUE, len(triangles))
@@ -84,7 +83,6 @@ def draw_smooth(axes: Axes, shape: Shape, mesh: OrganMesh, colours: Mapping[str,
 
 
 def draw_mesh(axes: Axes, mesh: OrganMesh, colours: Mapping[str, str], camera: Camera) -> None:
-    """Draws the triangles of the outer surface, with the patches in their colours."""
     triangles = mesh.outer_triangles
     own = uniform(TISSUE, len(triangles))
     for patch in mesh.patches:
@@ -121,7 +119,6 @@ def window(axes: Axes, points: np.ndarray, camera: Camera) -> None:
 
 
 def _describe(axes: Axes, mesh: OrganMesh, shape: Shape) -> None:
-    """Writes volumes, those of the literature, and numbers of nodes, triangles and tetrahedra below a panel."""
     inside = f"{1e6 * (mesh.lumen_volume if mesh.hollow else mesh.volume):,.0f} mL"
     words = [f"wall {1e3 * (shape.wall or 0.0):g} mm, content {inside}" if mesh.hollow else inside]
     if shape.literature is not None:

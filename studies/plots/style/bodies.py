@@ -29,7 +29,6 @@ class BodyLook:
     """Colour in a chart of one method and several families of bodies; None: the colour of the method."""
 
     def colour(self, method: str) -> str:
-        """Colour of the body with the method of this name."""
         return self.family_colour or method_colour(method)
 
 
@@ -78,7 +77,6 @@ def body_method_handles(runs: Sequence[Run], looks: dict[BodyRecipe, BodyLook], 
 
 
 def body_handle(look: BodyLook, method: str, markers: bool = False) -> Line2D:
-    """The legend entry of a body with a method; markers: a marker instead of a line."""
     entry = Line2D([], [], color=look.colour(method), label=f"{look.name}, {method_label(method)}")
     if markers:
         entry.set(marker=look.marker, linestyle="", markersize=7)

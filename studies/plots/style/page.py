@@ -100,7 +100,6 @@ def _fitting(columns: int, labels: Sequence[str], width: float) -> int:
 
 @styled
 def blank(title: str, reason: str) -> Figure:
-    """A page that says why there is no chart."""
     figure = page(8, 2.5)
     axes = figure.subplots()
     axes.set_axis_off()
@@ -109,7 +108,6 @@ def blank(title: str, reason: str) -> Figure:
 
 
 def grouped(runs: Sequence[Run], key: Callable[[Run], object]) -> list[list[Run]]:
-    """Groups of runs with the same key, in the order of their first runs."""
     groups: dict[object, list[Run]] = {}
     for run in runs:
         groups.setdefault(key(run), []).append(run)
@@ -159,28 +157,23 @@ def unresolved_mark(group: Sequence[Run], metrics: Sequence[Metric]) -> str:
 
 
 def has_frames(run: Run) -> bool:
-    """Whether the run recorded a frame; a run that could not start has none."""
     return "t" in run.record.fields and good_frames(run) > 0
 
 
 def good_frames(run: Run) -> int:
-    """Number of frames before the run broke off."""
     return int(run.record.attributes.get("good_frames", len(run.fields.t)))
 
 
 def reference_handle(label: str = "reference (finite elements)", **look: object) -> Line2D:
-    """The legend entry of the reference, in black; look: properties of the line."""
     plain = {"marker": "o", "linestyle": "", "markersize": 5.5, "markeredgecolor": "white"} | look
     return Line2D([], [], color=BLACK, label=label, **plain)  # pyright: ignore[reportArgumentType]
 
 
 def band_handle(label: str) -> Patch:
-    """The legend entry of a grey area."""
     return Patch(facecolor=GREY, alpha=0.3, linewidth=0, label=label)
 
 
 def hollow_handle(colour: str) -> Line2D:
-    """The legend entry of errors that the reference is too coarse to resolve."""
     return Line2D(
         [],
         [],

@@ -189,5 +189,4 @@ def method_label(name: str) -> str:
 
 
 def remark(axes: Axes, text: str) -> None:
-    """Writes small grey words in the middle of an empty panel."""
     axes.text(0.5, 0.5, text, transform=axes.transAxes, ha="center", va="center", color=GREY, size=SMALL)

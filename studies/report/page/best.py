@@ -75,7 +75,6 @@ def _timed(row: Best, speeds: Mapping[str, list[float]]) -> Best:
 
 
 def own_first(best: Sequence[Best], own: Collection[str]) -> list[Best]:
-    """The rows of the scenes in `own`, then the others."""
     return sorted(best, key=lambda row: row["scene"] not in own)
 
 
@@ -110,7 +109,6 @@ def _which(best: Sequence[Best]) -> str:
 
 
 def _body(words: str) -> str:
-    """ "quadratic, 594, 0.8" as "quadratic, 594 nodes"."""
     body, nodes, _ = words.rsplit(", ", 2)
     return f"{body}, {nodes} nodes"
 
@@ -154,7 +152,6 @@ def _span(rows: Sequence[Best], name: str) -> str:
 
 
 def scene_rows(best: Sequence[Best]) -> list[dict[str, Any]]:
-    """Of each scene its name, its body, and the paper's."""
     return [
         {"scene": readable(row["scene"]), "meets": row["meets"], "best": _cells(row)}
         | {"paper": _cells(row["paper"]) if row["paper"] else None}

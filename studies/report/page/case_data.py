@@ -80,7 +80,6 @@ def checkpoint_surface(run: Run) -> Surface | None:
 
 
 def why_still(run: Run) -> str:
-    """Why there is nothing that moves."""
     if not run.record.fields:
         return "Nothing was computed, so there is no replay."
     if not len(run.field("snapshots")):
@@ -104,7 +103,6 @@ def histories(run: Run) -> dict[str, Any]:
 
 
 def probes_force(run: Run) -> bool:
-    """Whether the scene has the obstacle or held region that it probes; bodies that only fall have neither."""
     scene = run.case.scene
     return scene.probed.number < len(scene.obstacles if scene.probed.what == "obstacle" else scene.held)
 

@@ -26,8 +26,6 @@ RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 @dataclass(frozen=True)
 class Finding:
-    """A number and its meaning."""
-
     title: str
     number: str
     text: str
@@ -42,7 +40,6 @@ def findings(tables: Tables) -> list[Finding]:
 
 
 def volume(tables: Tables) -> Finding | None:
-    """How well volumes are kept, and how much volume the same bodies lose without a constraint."""
     pairs = _pairs(_joined(tables, VOLUME))
     if not pairs:
         return None
@@ -58,7 +55,6 @@ def volume(tables: Tables) -> Finding | None:
 
 
 def one_volume(tables: Tables) -> Finding | None:
-    """How accurate forces are in bodies that keep one volume."""
     rows = [row for row in _ended_well(tables.get("volume_loss", ()), FORCE) if row["method"] == KEPT]
     if not rows:
         return None
@@ -74,7 +70,6 @@ def one_volume(tables: Tables) -> Finding | None:
 
 
 def nearest_force(tables: Tables) -> Finding | None:
-    """How near forces come to the reference, scene by scene."""
     best: dict[str, Row] = {}
     for row in _joined(tables, FORCE, MEAN):
         if row["method"] == KEPT and abs(row[FORCE]) < abs(best.get(row["scene"], {FORCE: float("inf")})[FORCE]):
@@ -94,7 +89,6 @@ def nearest_force(tables: Tables) -> Finding | None:
 
 
 def cost(tables: Tables) -> Finding | None:
-    """What keeping one volume adds to a frame."""
     pairs = _pairs(_ended_well(tables.get("frame_rate", ()), FRAME))
     if not pairs:
         return None
@@ -112,7 +106,6 @@ def cost(tables: Tables) -> Finding | None:
 
 
 def real_time(tables: Tables) -> Finding | None:
-    """How many bodies keep up with the clock."""
     rows = list({_key(row, "method", "dt [ms]"): row for row in _joined(tables, REAL)}.values())
     if not rows:
         return None
@@ -126,7 +119,6 @@ def real_time(tables: Tables) -> Finding | None:
 
 
 def limit(tables: Tables) -> Finding | None:
-    """Whether the step limit predicts at which step runs break."""
     rows = [row for row in tables.get("stability_map", ()) if row.get("dt/dt_c") is not None]
     if not rows:
         return None
@@ -168,7 +160,6 @@ def _contests(tables: Tables, column: str) -> list[tuple[str, Row, Row | None]]:
 
 
 def _win(column: str, best: Row, ours: Row | None) -> str:
-    """What the best entry reached, and the best of ours."""
     what, unit = CONTESTED[column], column.split("[")[1].rstrip("]")
 
     def number(row: Row) -> str:
@@ -183,7 +174,6 @@ def _joined(tables: Tables, *columns: str) -> list[Row]:
 
 
 def _ended_well(table: Sequence[Row], *columns: str) -> list[Row]:
-    """Rows with status ok and numbers in all these columns."""
     return [row for row in table if row["status"] == "ok" and all(row.get(name) is not None for name in columns)]
 
 
@@ -210,7 +200,6 @@ def _floor(row: Row, column: str) -> float | None:
 
 
 def _measured(row: Row, column: str, signed: bool = True) -> str:
-    """A value with its uncertainty."""
     floor = _floor(row, column)
     return value_cell(row[column], float("nan") if floor is None else floor, signed=signed)
 

@@ -40,7 +40,6 @@ JUDGED = ("force_end", "mean_error", "real_time")
 
 
 def unbroken(text: str) -> str:
-    """The text with non-breaking spaces between numbers, their uncertainty and unit."""
     return text.replace(" ± ", "\u00a0±\u00a0").replace(" %", "\u00a0%").replace(" × ", "\u00a0×\u00a0")
 
 
@@ -128,7 +127,6 @@ def _metric_cell(row: Mapping[str, Any], metric: Any) -> Cell:
 
 
 def machine_words(machine: Mapping[str, Any]) -> str:
-    """Processor, system and versions of the machine that measured the times."""
     facts = [str(machine[name]) for name in ("cpu", "system", "python") if machine.get(name)]
     return ", ".join(facts + [f"{name} {version}" for name, version in machine.get("packages", {}).items() if version])
 

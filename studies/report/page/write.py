@@ -104,7 +104,6 @@ def joined_cases(parts: Sequence[Part]) -> dict[str, Any]:
 
 
 def joined_rows(rows: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
-    """A row per case: values that one study did not measure come from the next, and all its studies are named."""
     by_case: dict[str, dict[str, Any]] = {}
     for row in rows:
         one = by_case.setdefault(row["case"], {**row, "study": ""})
@@ -219,7 +218,6 @@ def first_case(cases: dict[str, Any]) -> str | None:
 
 
 def csv_of(rows: Sequence[dict[str, Any]]) -> str:
-    """All columns of all studies; what a study does not measure stays empty."""
     return pd.DataFrame([{name: value for name, value in row.items() if name != "case"} for row in rows]).to_csv(
         index=False, float_format="%.6g"
     )

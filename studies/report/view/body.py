@@ -33,7 +33,6 @@ class Shown:
 
     @property
     def cell_type(self) -> int:
-        """As VTK numbers it."""
         return {3: TRIANGLE, 4: TETRAHEDRON, 10: QUADRATIC_TETRAHEDRON}[self.cells.shape[1]]
 
     @property

@@ -23,12 +23,10 @@ class Data:
 
     @property
     def rows(self) -> int:
-        """Of one step."""
         return self.values.shape[1 if self.moves else 0]
 
     @property
     def columns(self) -> int:
-        """Numbers in a row."""
         return int(np.prod(self.values.shape[2 if self.moves else 1 :]))
 
 

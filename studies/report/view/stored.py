@@ -31,12 +31,10 @@ class Stored:
 
     @cached_property
     def scene_data(self) -> dict[str, Any]:
-        """The scene of the case, JSON-able."""
         return json.loads(self.header.key)["scene"]
 
     @property
     def scene(self) -> str:
-        """Its name."""
         return str(self.scene_data["name"])
 
     @property

@@ -44,7 +44,6 @@ class _References:
     """Sentences in order, each once."""
 
     def of(self, root: Path, scene: Scene) -> Solution | None:
-        """That of a scene; None where it is not stored, with a remark."""
         if scene.reference is None:
             return None
         try:
