@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 from studies.base.atomic import is_there
 from studies.base.errors import DamagedFile, OtherVersion, StudyError
 from studies.store.paths import key_digest
-from studies.store.record import glance
+from studies.store.record import peek
 
 MISSING = "has not run"
 DAMAGED = "its file is damaged"
@@ -65,7 +65,7 @@ def read_entry(path: Path) -> Entry:
     """
     empty = Entry(path.name, file_state(path.stat()) if is_there(path) else (0, 0, 0, 0))
     try:
-        record = glance(path, ATTRIBUTES)
+        record = peek(path, ATTRIBUTES)
         digest = key_digest(record.key)
     except StudyError as error:
         kinds = {DamagedFile: DAMAGED, OtherVersion: OTHER_VERSION}

@@ -42,10 +42,7 @@ class Machine:
 def this_machine() -> Machine:
     """The machine that runs this process."""
     cpu, virtual = _cpu()
-    system = " ".join(part for part in (platform.system(), platform.release()) if part)
-    memory = _memory_gb()
-    cores = os.cpu_count() or 1
-    architecture = platform.machine()
+    architecture, cores, memory = platform.machine(), os.cpu_count() or 1, _memory_gb()
     hardware = json.dumps([cpu, architecture, cores, memory, platform.system()])
     return Machine(
         id=hashlib.sha256(hardware.encode()).hexdigest()[:8],
@@ -55,7 +52,7 @@ def this_machine() -> Machine:
         virtual=virtual,
         clock=_clock(),
         memory_gb=memory,
-        system=system,
+        system=" ".join(filter(None, (platform.system(), platform.release()))),
         python=f"{platform.python_implementation()} {platform.python_version()}",
         packages={name: _version(name) for name in PACKAGES},
     )
@@ -86,21 +83,19 @@ def write_machine(path: Path) -> None:
 
 
 def _cpu() -> tuple[str, bool | None]:
-    facts = _first_cpu(CPUINFO.read_text()) if CPUINFO.is_file() else {}
+    """Name of the first processor, with what tells apart those that virtual machines give one name; Machine.virtual."""
+    text = CPUINFO.read_text() if CPUINFO.is_file() else ""
+    lines = (line.partition(":") for line in text.split("\n\n")[0].splitlines())
+    facts = {name.strip(): value.strip() for name, _, value in lines}
     name = facts.get("model name") or platform.processor() or platform.machine() or "unknown"
     if "cpu family" in facts:
         name += f" (family {facts['cpu family']}, model {facts.get('model', '?')})"
-    flags = facts.get("flags")
-    return name, None if flags is None else "hypervisor" in flags.split()
-
-
-def _first_cpu(text: str) -> dict[str, str]:
-    lines = (line.partition(":") for line in text.split("\n\n")[0].splitlines())
-    return {name.strip(): value.strip() for name, _, value in lines}
+    return name, "hypervisor" in facts["flags"].split() if "flags" in facts else None
 
 
 def _clock() -> dict[str, str | int | None]:
-    max_khz, governor = (_word(CPUFREQ / name) for name in ("cpuinfo_max_freq", "scaling_governor"))
+    paths = (CPUFREQ / name for name in ("cpuinfo_max_freq", "scaling_governor"))
+    max_khz, governor = (path.read_text().strip() if path.is_file() else None for path in paths)
     timer = time.get_clock_info("perf_counter")
     return {
         "max_mhz": int(max_khz) // 1000 if max_khz else None,
@@ -108,10 +103,6 @@ def _clock() -> dict[str, str | int | None]:
         "timer": timer.implementation,
         "timer_resolution_ns": round(timer.resolution * 1e9),
     }
-
-
-def _word(path: Path) -> str | None:
-    return path.read_text().strip() if path.is_file() else None
 
 
 def _memory_gb() -> int | None:

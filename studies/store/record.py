@@ -149,16 +149,12 @@ def read_record(path: Path, fields: Iterable[str] | None = None) -> Record:
     return record
 
 
-def peek(path: Path) -> Record:
-    """The record in `path` without its fields: some milliseconds, and one for every megabyte. Errors as read_record."""
-    with open_results(path) as file:
-        return _header(path, file)
+def peek(path: Path, attributes: Collection[str] | None = None) -> Record:
+    """The record in `path` without its fields: a millisecond, and one for every megabyte. Errors as read_record.
 
-
-def glance(path: Path, attributes: Collection[str]) -> Record:
-    """As `peek`, with only the named attributes, where they exist: a third of the time for a small file."""
+    attributes: only these, where they exist, which takes a third of the time for a small file."""
     with open_results(path) as file:
-        return _header(path, file, (*HEADER, *attributes))
+        return _header(path, file, None if attributes is None else (*HEADER, *attributes))
 
 
 def canonical(key: str) -> str:

@@ -25,28 +25,17 @@ from studies.store.parts import (
 class Status(StrEnum):
     """How a case ended."""
 
-    OK = "ok"
-    DIVERGED = "diverged"
-    INVERTED = "inverted"
-    DRIFTED = "drifted"
-    NOT_CONVERGED = "not-converged"
-    BLOCKED = "blocked"
-    TIMED_OUT = "timed-out"
-    FAILED = "failed"
-    SKIPPED = "skipped"
+    OK = "ok"  # finished without a failure
+    DIVERGED = "diverged"  # values not finite, or nodes that left
+    INVERTED = "inverted"  # an element is inverted at the end
+    DRIFTED = "drifted"  # a kept volume more than 1 % off
+    NOT_CONVERGED = "not-converged"  # the reference found no equilibrium at a checkpoint
+    BLOCKED = "blocked"  # a thin probe was driven through tissue that had nowhere to go
+    TIMED_OUT = "timed-out"  # took more processor time than a run may
+    FAILED = "failed"  # could not start, or its process died three times; the message says why
+    SKIPPED = "skipped"  # the method does not apply to the scene or the body; the message says why
 
 
-STATUSES: dict[Status, str] = {
-    Status.OK: "finished without a failure",
-    Status.DIVERGED: "values not finite, or nodes that left",
-    Status.INVERTED: "an element is inverted at the end",
-    Status.DRIFTED: "a kept volume more than 1 % off",
-    Status.NOT_CONVERGED: "the reference found no equilibrium at a checkpoint",
-    Status.BLOCKED: "a thin probe was driven through tissue that had nowhere to go",
-    Status.TIMED_OUT: "took more processor time than a run may",
-    Status.FAILED: "could not start, or its process died three times; the message says why",
-    Status.SKIPPED: "the method does not apply to the scene or the body; the message says why",
-}
 WITHOUT_FIELDS = (Status.FAILED, Status.SKIPPED)
 """Nothing was computed: such a record has no fields, and no attributes but warnings."""
 

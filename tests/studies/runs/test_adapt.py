@@ -6,14 +6,12 @@ import numpy as np
 import pytest
 
 from massspring import MassSpringError, Trajectory
-from studies.base.errors import StudyError
 from studies.geometry import HalfSpace
 from studies.meshing.scene_mesh import mesh_for, patch_nodes
 from studies.runs.prepare import attachments_for, body_for, prepare
 from studies.runs.recipes import BODIES, TetrahedralBody
 from studies.scene.library.ball_clamped import BALL_CLAMPED
 from studies.scene.scene import Held
-from tests.studies.geometry.boxes import box, split
 from tests.studies.tiny import NODES, SQUEEZE, cube, file_scene, tiny_case, write_obj
 
 CLAMPED = replace(BALL_CLAMPED, reference=None)
@@ -81,22 +79,6 @@ def test_a_mesh_from_a_file_is_attached_where_the_region_is(tmp_path):
     nodes = patch_nodes(mesh, "top", top)
     assert len(nodes) == 9
     assert (mesh.points[nodes, 2] == 0.05).all()
-
-
-def test_a_file_may_ask_for_a_new_surface(tmp_path):
-    points, faces = split(*box((-1, -1, -1), (1, 1, 1)), times=3)
-    points *= 0.03 / np.linalg.norm(points, axis=1, keepdims=True)
-    scene = file_scene(write_obj(tmp_path / "ball.obj", points, faces))
-    parameters = dict(scene.organ.parameters)
-
-    def meshed(**more):
-        return mesh_for(replace(scene, organ=replace(scene.organ, parameters=parameters | more)), 150)
-
-    assert meshed().surface_count == len(points)
-    assert meshed(remesh=True).surface_count == 150
-    assert meshed(wall=0.005).hollow
-    with pytest.raises(StudyError, match="unknown parameter of an organ from a file 'wal'; did you mean 'wall'"):
-        meshed(wal=0.005)
 
 
 def test_dt_auto_is_the_fraction_of_the_limit_of_the_held_body():

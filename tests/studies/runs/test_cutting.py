@@ -16,7 +16,6 @@ from studies.reference.reference_solves import ReferenceSolve
 from studies.reference.sample import parted
 from studies.reference.solve import solve
 from studies.runs.case import Case
-from studies.runs.prepare import prepare
 from studies.runs.recipes import QuadraticBody, SurfaceBody, TetrahedralBody
 from studies.runs.run import measure
 from studies.scene.library.ball_cuts import BALL_BISECTED, BALL_INCISED
@@ -100,24 +99,6 @@ def test_the_halves_of_a_ball_go_back_to_their_shape_and_volume(body):
     whole = values["volume_target"][-1].sum()
     assert values["volume"].sum(axis=1) == pytest.approx(np.full(len(values["t"]), whole), rel=1e-4)
     assert values["elastic"][-1] < 1e-3 * values["elastic"].max()
-
-
-def test_a_surface_body_is_cut_in_two_closed_surfaces():
-    """The paper's body: the same trace as the tetrahedral one has, one section for both sides, two volumes."""
-    prepared, filled = (prepare(Case(BALL_BISECTED, body, ImplicitVolume())) for body in (SURFACE, ONE))
-    before, after, opening = prepared.setup.body, prepared.body, prepared.opening
-    np.testing.assert_array_equal(opening.parts, [0, 1])
-    assert after.rest_volumes.sum() == pytest.approx(before.volume, rel=1e-13, abs=0)
-    assert after.mass.sum() == pytest.approx(before.mass.sum(), rel=1e-12)
-    behind, front = (after.rest[opening.pairs[:, side]] for side in range(2))
-    np.testing.assert_array_equal(behind, front)
-    assert np.abs(behind[:, 2]).max() < 1e-9
-    np.testing.assert_array_equal(behind, filled.body.rest[filled.opening.pairs[:, 0]])
-    born = opening.pairs[after.mass[opening.pairs].all(axis=1)]
-    assert len(born) == len(opening.pairs) and len(opening.faces) == len(filled.opening.faces)
-    assert prepared.mesh.surface_count == len(prepared.mesh.points) == len(after.surface_nodes)
-    held = [np.isin(a.nodes, after.surface_nodes).all() for a in prepared.setup.events[0].attachments]
-    assert held == [True, True]
 
 
 def test_a_surface_body_is_recorded_and_measured_like_the_others(tmp_path):

@@ -12,7 +12,7 @@ from studies.runs.current import case_path, run_fingerprint
 from studies.store.entry import CASE_CHANGED, CODE_CHANGED, DAMAGED, MISSING, OTHER_VERSION, read_entry
 from studies.store.ledger import Ledger
 from studies.store.paths import record_files
-from studies.store.record import glance, peek, read_record, write_record
+from studies.store.record import peek, read_record, write_record
 from studies.store.schema import Status
 from studies.sweep.job import case_jobs
 from studies.sweep.standings import standings
@@ -39,7 +39,7 @@ def test_an_entry_says_what_the_record_says(many):
         assert (entry.name, entry.status, entry.message) == (record.name, "ok", "")
         assert (entry.fingerprint, entry.machine) == (record.fingerprint, record.machine)
         assert entry.written.startswith(f"{path.name} {path.stat().st_size} ") and entry.fault == ""
-        short = glance(path, ("dt", "nothing"))
+        short = peek(path, ("dt", "nothing"))
         assert short.attributes == {"dt": record.attributes["dt"]} and short.fields == {}
 
 

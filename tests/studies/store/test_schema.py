@@ -10,17 +10,12 @@ from studies.metrics.timing.cases import timing_file
 from studies.runs.current import case_path
 from studies.runs.run import OWN_FILES
 from studies.store.record import read_record
-from studies.store.schema import LAYOUTS, LENGTHS, RUN_FIELDS, STATUSES, Status, fault
+from studies.store.schema import LAYOUTS, LENGTHS, RUN_FIELDS, fault
 from tests.studies import made_up_run
 from tests.studies.tiny import tiny_case
 
 REPOSITORY = Path(__file__).parents[3]
 BY_NAME = re.compile(r"""\.field\(\s*"(\w+)"\s*\)|\.fields\["(\w+)"\]|(?:run|self)\.fields\.(\w+)""")
-
-
-def test_every_status_has_its_sentence():
-    assert list(STATUSES) == list(Status)
-    assert all(STATUSES.values())
 
 
 @pytest.mark.parametrize("kind", LAYOUTS)
