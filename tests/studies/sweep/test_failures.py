@@ -21,10 +21,10 @@ from studies.store.record import Status, peek, read_record, write_record
 from studies.sweep.job import ReferenceJob, do, jobs_of
 from studies.sweep.load import load_runs
 from studies.sweep.local import environment
-from studies.sweep.run_studies import Failures
+from studies.sweep.run_studies import Failures, run_studies
 from studies.sweep.standings import failed, standings
 from tests.studies.octant import SCENE
-from tests.studies.tiny import tiny_case, tiny_study
+from tests.studies.tiny import Silent, diverging_case, tiny_case, tiny_study
 
 ROOT = Path(__file__).parents[3]
 FATAL = """
@@ -63,6 +63,15 @@ def test_a_piece_that_died_is_stored_as_failed(tmp_path):
     assert [standing.status for standing in standings(ledger, tiny_study(cases=(case,)))] == ["failed"] * 2
     sentence = failures.sentence("again")
     assert sentence.startswith(f"failed: {jobs[0].label} (its process died), and 1 more; all others are done")
+
+
+def test_a_folder_in_the_place_of_a_file_costs_its_case(results):
+    path = case_path(results, "tiny", diverging_case())
+    path.unlink()
+    path.mkdir()
+    failures = Failures()
+    run_studies(results, [tiny_study()], 1, Silent(), failures=failures)
+    assert failures.causes == {diverging_case().name: f"{path} is a folder where a file belongs: delete it"}
 
 
 def test_what_another_command_has_done_meanwhile_is_not_done_again(results):
