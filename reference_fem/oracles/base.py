@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
@@ -23,22 +22,17 @@ class Check:
     mesh: str
     unknowns: int
     absolute: bool = False
-    kind: Literal["within", "at least", "misses"] = "within"
-    """at least: only a smaller value is a deviation. misses: a control that is expected to be wrong, so it must deviate
-    by more."""
 
     @property
     def deviation(self) -> float:
         """Distance from the expected value, relative to it unless `absolute`."""
         gap = abs(self.got - self.expected)
-        if self.kind == "at least" and self.got > self.expected:
-            gap = 0.0
         return gap if self.absolute else gap / abs(self.expected)
 
     @property
     def met(self) -> bool:
         """Whether the check passes; NaN never does."""
-        return self.deviation > self.tolerance if self.kind == "misses" else self.deviation <= self.tolerance
+        return self.deviation <= self.tolerance
 
 
 @dataclass(frozen=True)

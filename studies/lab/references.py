@@ -5,16 +5,22 @@ For a release: a new set changes results (CHANGELOG). Scenes that are not named 
 """
 
 import argparse
+import hashlib
+import json
 import multiprocessing
 import sys
 import tempfile
+from collections.abc import Mapping
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
-from studies import Reference, Scene, reference_for, solve_reference
-from studies.reference.published import FOLDER, judged_scenes, write_published
+import h5py
+import numpy as np
+
+from studies import Record, Reference, Scene, reference_for, solve_reference
+from studies.reference.published import FOLDER, INDEX, LENGTHS, PRECISION, index, judged_scenes, physics
 
 MOST, TOLERANCE = 80e3, 0.002
 """Unknowns and tolerance of published nested references: finer than the plans of the scenes, which are affordable for
@@ -40,6 +46,45 @@ def publish(set_name: str, names: list[str], root: Path, most: float = MOST, fol
         references = dict(zip(names, pool.map(partial(solved, root, most), names), strict=True))
     records = {name: (one.scene, one.record, one.total_uncertainty) for name, one in references.items()}
     return write_published(folder, set_name, records)
+
+
+def write_published(folder: Path, name: str, records: Mapping[str, tuple[Scene, Record, Mapping[str, float]]]) -> Path:
+    """A set of references in a folder: by name of the scene the scene, its record and its error bars; returns the path
+    of the index. Other entries of the index do not change."""
+    folder.mkdir(parents=True, exist_ok=True)
+    path = folder / INDEX
+    listed = json.loads(path.read_text(encoding="utf-8"))["references"] if path.is_file() else {}
+    for title, (scene, record, bars) in records.items():
+        file = folder / f"{title}.h5"
+        write_file(file, record)
+        listed[title] = {
+            "file": file.name,
+            "sha256": hashlib.sha256(file.read_bytes()).hexdigest(),
+            "physics": physics(scene),
+            "unknowns": record.attributes["unknowns"],
+            "relative bars": {quantity: float(f"{bar:.3g}") for quantity, bar in bars.items()},
+        }
+    path.write_text(json.dumps({"set": name, "references": listed}, indent=1) + "\n", encoding="utf-8")
+    index.cache_clear()
+    return path
+
+
+def write_file(path: Path, record: Record) -> None:
+    """All fields of a reference, compressed, its lengths rounded to PRECISION of the largest displacement."""
+    largest = np.abs(record.fields["displacement"].values).max()
+    digits = int(np.ceil(-np.log10(2.0 * PRECISION * largest)))
+    with h5py.File(path, "w", libver="v110") as file:
+        file.attrs.update(record.attributes)
+        for name, item in record.fields.items():
+            values = np.asarray(item.values)
+            if values.dtype.kind == "U":
+                file.create_dataset(name, data=values.astype(h5py.string_dtype()))
+            elif name in LENGTHS:
+                rounded = np.round(values, digits).astype(np.float32)
+                file.create_dataset(name, data=rounded, scaleoffset=digits, compression="gzip")
+            else:
+                options = {"compression": "gzip", "shuffle": True} if values.size > 100 else {}
+                file.create_dataset(name, data=values.astype(np.uint32) if name == "tetrahedra" else values, **options)
 
 
 def check(names: list[str], root: Path) -> list[str]:

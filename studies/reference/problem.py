@@ -57,16 +57,11 @@ def _cavity(scene: Scene, middles: np.ndarray) -> Cavity:
     return Cavity(where=lambda x: tree.query(x.T)[0] < reach, volume=scene.lumen.filling)
 
 
-def anchor(obstacle: Obstacle) -> np.ndarray:
-    """Point of a plane, centre of a sphere or start of a capsule [m], (3,)."""
-    return obstacle.anchor
-
-
 def kept_obstacles(scene: Scene) -> tuple[Obstacle, ...]:
     """The obstacles of the reference: for an octant only those on its side of the symmetry planes."""
     if not scene.symmetric:
         return scene.obstacles
-    return tuple(o for o in scene.obstacles if (anchor(o) >= 0).all())
+    return tuple(o for o in scene.obstacles if (o.anchor >= 0).all())
 
 
 def whole_forces(scene: Scene, forces: np.ndarray) -> np.ndarray:
@@ -76,10 +71,10 @@ def whole_forces(scene: Scene, forces: np.ndarray) -> np.ndarray:
     """
     if not scene.symmetric:
         return forces
-    kept = np.array([anchor(o) for o in kept_obstacles(scene)])
+    kept = np.array([o.anchor for o in kept_obstacles(scene)])
     whole = np.zeros((len(forces), len(scene.obstacles), 3))
     for number, obstacle in enumerate(scene.obstacles):
-        at = anchor(obstacle)
+        at = obstacle.anchor
         twin = int(np.argmin(np.linalg.norm(kept - np.abs(at), axis=1)))
         whole[:, number] = np.sign(at) * forces[:, twin] * 2.0 ** np.count_nonzero(at == 0)
     return whole

@@ -9,6 +9,7 @@ import numpy as np
 
 from reference_fem import (
     DynamicsSettings,
+    Equilibrium,
     Moment,
     NewtonSettings,
     Problem,
@@ -19,14 +20,14 @@ from reference_fem import (
 )
 from studies.base.errors import StudyError
 from studies.geometry.mesh.organ_mesh import mean_edge, tetrahedron_facets
-from studies.reference.fields import fields_of
 from studies.reference.nested import FamilySolution, solve_nested
-from studies.reference.problem import reference_problem
+from studies.reference.problem import reference_problem, whole_forces
 from studies.reference.reference_solves import ReferenceSolve, reference_fingerprint, settings_varied
-from studies.reference.sample import Sample, SamplePoints, sample_of
+from studies.reference.sample import Sample, SamplePoints, mean_pressure, sample_fields, sample_of
 from studies.reference.uncertainty import KAPPA_FACTOR, PENALTY_FACTOR, STEP_FACTOR
 from studies.scene.scene import Scene
-from studies.store.record import Status, new_record, write_record
+from studies.store.record import Field, Status, new_fields, new_record, write_record
+from studies.store.schema import REFERENCE_FIELDS
 
 Set = tuple[Problem, tuple[float, ...], NewtonSettings]
 
@@ -88,6 +89,47 @@ def solve(root: Path, reference_solve: ReferenceSolve) -> Path:
     )
     write_record(record_file, record)
     return record_file
+
+
+def fields_of(scene: Scene, solution: FamilySolution) -> dict[str, Field]:
+    """The equilibria at the checkpoints, one row each, NaN for checkpoints that the path did not reach; and the
+    samples."""
+    problem, equilibria = solution.problem, solution.equilibria
+    x, tetrahedra = nodes(problem.mesh), problem.mesh.t.T.astype(np.int64)
+    lengths = {"K": len(scene.checkpoints), "o": len(scene.obstacles), "g": len(problem.held), "n": len(x)}
+
+    def row(e: Equilibrium) -> dict[str, np.ndarray | float]:
+        return {
+            "contact_force": whole_forces(scene, e.obstacle_force[None])[0],
+            "held_force": e.held_force,
+            "volume": e.volume / e.volume0,
+            "pressure": mean_pressure(problem, e),
+            "lumen_pressure": float(e.cavity_pressure.sum()) if scene.filled else np.nan,
+            "min_j": e.min_J,
+            "max_j": e.max_J,
+            "penetration": e.penetration,
+            "newton": float(e.newton_iterations),
+            "energy": e.energy,
+            "kinetic": _of_motion(e, "kinetic"),
+            "balance": _of_motion(e, "balance"),
+            "displacement": e.u,
+        }
+
+    rows = [row(e) for e in equilibria]
+    values = {"t": np.array(scene.checkpoints), "nodes": x, "tetrahedra": tetrahedra}
+    values |= sample_fields(solution.at, solution.samples, len(scene.checkpoints))
+    for name in REFERENCE_FIELDS.keys() - values.keys():
+        if REFERENCE_FIELDS[name].optional:
+            continue
+        shape = REFERENCE_FIELDS[name].shape.split()
+        values[name] = np.full([lengths[part] if part in lengths else int(part) for part in shape], np.nan)
+        for k, reached in enumerate(rows):
+            values[name][k] = reached[name]
+    return new_fields(REFERENCE_FIELDS, {name: values[name] for name in REFERENCE_FIELDS if name in values})
+
+
+def _of_motion(equilibrium: Equilibrium, name: str) -> float:
+    return getattr(equilibrium, name) if isinstance(equilibrium, Moment) else np.nan
 
 
 def solve_levels(scene: Scene) -> FamilySolution:

@@ -51,11 +51,6 @@ def force(at: SamplePoints, a: Sample, b: Sample) -> float:
     return float(np.linalg.norm((a.force - b.force)[both]) / np.linalg.norm(b.force[both]))
 
 
-def force_end(at: SamplePoints, a: Sample, b: Sample) -> float:
-    """|F_a/F_b − 1| at the last checkpoint."""
-    return float(abs(a.force[-1] / b.force[-1] - 1))
-
-
 def _relative(a: Sample, b: Sample, weights: np.ndarray) -> float:
     change, size = ((a.u - b.u) ** 2).sum(axis=1), (b.u**2).sum(axis=1)
     return float(np.sqrt((weights @ change) / (weights @ size)))
@@ -88,33 +83,26 @@ def volume(at: SamplePoints, a: Sample, b: Sample) -> float:
     return float(np.nanmax(np.abs(a.volume - b.volume)))
 
 
-def pressure(at: SamplePoints, a: Sample, b: Sample) -> float:
-    """|p_a/p_b − 1| at the last checkpoint."""
-    return float(abs(a.pressure[-1] / b.pressure[-1] - 1))
-
-
-def frequency(at: SamplePoints, a: Sample, b: Sample) -> float:
-    """|f_a/f_b − 1| of the ringing."""
-    return abs(a.frequency / b.frequency - 1)
-
-
 def opening(at: SamplePoints, a: Sample, b: Sample) -> float:
     """Relative L2 of the displacement across a cut, over the vertices that it parts."""
     return float(np.linalg.norm(a.opening - b.opening) / np.linalg.norm(b.opening))
 
 
-def lumen(at: SamplePoints, a: Sample, b: Sample) -> float:
-    """|p_a/p_b − 1| of the lumen at the last checkpoint."""
-    return float(abs(a.lumen_pressure[-1] / b.lumen_pressure[-1] - 1))
+Values = Callable[[Sample], np.ndarray]
 
 
-NUMBERS: dict[str, tuple[Measure, Callable[[Sample], np.ndarray]]] = {
+def end(values: Values) -> tuple[Measure, Values]:
+    """|value_a/value_b − 1| of the last of some values, and those values."""
+    return (lambda at, a, b: float(abs(values(a)[-1] / values(b)[-1] - 1))), values
+
+
+NUMBERS: dict[str, tuple[Measure, Values]] = {
     "force": (force, lambda sample: sample.force),
-    "force_end": (force_end, lambda sample: sample.force[-1:]),
+    "force_end": end(lambda sample: sample.force[-1:]),
     "volume": (volume, lambda sample: sample.volume),
-    "pressure": (pressure, lambda sample: sample.pressure[-1:]),
-    "frequency": (frequency, lambda sample: np.array([sample.frequency])),
-    "lumen": (lumen, lambda sample: sample.lumen_pressure[-1:]),
+    "pressure": end(lambda sample: sample.pressure[-1:]),
+    "frequency": end(lambda sample: np.array([sample.frequency])),
+    "lumen": end(lambda sample: sample.lumen_pressure[-1:]),
 }
 """Numbers and series: (measure of a change, values of a sample)."""
 FIELDS: dict[str, tuple[Measure, Callable[[SamplePoints], np.ndarray]]] = {

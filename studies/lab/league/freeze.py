@@ -16,8 +16,9 @@ from typing import Any
 from studies import BALL_CLAMPED, BALL_SQUEEZE, KIDNEY_PROBE, LIVER_PRESS, LIVER_PROBE, Scene, export
 from studies.exchange.league import FILE, SET
 from studies.lab.population.draw import member
+from studies.lab.references import write_file
 from studies.reference.load import load_reference
-from studies.reference.published import FOLDER, INDEX, physics, write_file
+from studies.reference.published import FOLDER, INDEX, physics
 from studies.reference.reference_solves import ReferenceSolve
 from studies.reference.solve import solve
 from studies.scene.as_json import scene_to_json

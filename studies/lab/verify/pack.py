@@ -73,9 +73,8 @@ def check_table(verdicts: Sequence[Verdict]) -> pd.DataFrame:
 
 
 def tolerance(check: Check) -> str:
-    """What the deviation must be: "<= 0.005", "<= 0.15 abs" in the quantity's unit, "> 0.5" for what must miss."""
-    sign = ">" if check.kind == "misses" else "<="
-    return f"{sign} {check.tolerance:g}{' abs' if check.absolute else ''}"
+    """What the deviation must be: "<= 0.005", or "<= 0.15 abs" in the quantity's unit."""
+    return f"<= {check.tolerance:g}{' abs' if check.absolute else ''}"
 
 
 def summary(verdicts: Sequence[Verdict]) -> str:
@@ -105,9 +104,7 @@ def summary(verdicts: Sequence[Verdict]) -> str:
 def closeness(check: Check) -> float:
     """How much of its tolerance a number uses: above 1 it fails, and so does a NaN."""
     used = check.deviation / check.tolerance
-    if not math.isfinite(used):
-        return math.inf
-    return 1.0 / max(used, 1e-300) if check.kind == "misses" else used
+    return used if math.isfinite(used) else math.inf
 
 
 def write_verdicts(folder: Path, verdicts: Sequence[Verdict]) -> list[Path]:

@@ -15,7 +15,7 @@ from studies.meshing.kept_shape import FINER
 from studies.meshing.nested_mesh import base_mesh
 from studies.meshing.scene_mesh import mesh_for, patch_nodes
 from studies.reference.nested import problem_of
-from studies.reference.problem import anchor, kept_obstacles, reference_problem
+from studies.reference.problem import kept_obstacles, reference_problem
 from studies.scene.library import JUDGED, SCENES
 from tests.campaigns import campaigns_but
 from tests.studies.catalog.test_scenes import SMALL, THIN, small_setup
@@ -114,8 +114,8 @@ def test_both_solvers_see_the_same_obstacles(judged):
             assert rigid.radius == obstacle.radius
     # An octant keeps one of two mirrored obstacles; nothing else is left out.
     dropped = [o for o in judged.obstacles if o not in kept_obstacles(judged)]
-    mirrored = [np.abs(anchor(o)).tolist() for o in dropped]
-    assert all(any(np.allclose(m, anchor(k)) for k in kept_obstacles(judged)) for m in mirrored)
+    mirrored = [np.abs(o.anchor).tolist() for o in dropped]
+    assert all(any(np.allclose(m, k.anchor) for k in kept_obstacles(judged)) for m in mirrored)
 
 
 def test_both_solvers_hold_the_same_region(judged):

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from studies.base.errors import StudyError
+from studies.lab.references import write_published
 from studies.meshing.true_shape import true_shape
 from studies.metrics.run import doubled
 from studies.reference import published as module
@@ -23,7 +24,6 @@ from studies.reference.published import (
     physics,
     published,
     record_of,
-    write_published,
 )
 from studies.reference.reference_solves import reference_fingerprint
 from studies.scene.library import BALL_SQUEEZE, JUDGED, LIVER_PRESS
