@@ -28,5 +28,4 @@ def case_fingerprint(case: Case) -> str:
 
 
 def case_path(root: Path, study: str, case: Case) -> Path:
-    """Path of the record of a case."""
     return record_path(root, study, case.name, case.key)

@@ -22,22 +22,16 @@ TIMED = (Status.OK, Status.INVERTED, Status.DRIFTED)
 
 
 class Result(Protocol):
-    """The properties of a job by which the ledger finds its result."""
+    """The properties of a job (studies.sweep.job) by which the ledger finds its result."""
 
     @property
-    def path(self) -> Path:
-        """The path of its record."""
-        ...
+    def path(self) -> Path: ...
 
     @property
-    def digest(self) -> str:
-        """SHA-256 (hex) of the case."""
-        ...
+    def digest(self) -> str: ...
 
     @property
-    def fingerprint(self) -> str:
-        """Hash of the code that computes it."""
-        ...
+    def fingerprint(self) -> str: ...
 
 
 class Ledger:
@@ -76,7 +70,6 @@ class Ledger:
         self._entries.clear()
 
     def entry(self, job: Result) -> Entry | None:
-        """The file of a job."""
         return self.at(job.path)
 
     def why(self, job: Result) -> str | None:
@@ -88,7 +81,6 @@ class Ledger:
         return self.at(job.path.with_name(timing_name(job.path.name, machine or machine_id())))
 
     def can_be_timed(self, job: Result) -> bool:
-        """Whether a case is stored that ran to its end."""
         entry = self.entry(job)
         return entry is not None and entry.status in TIMED
 

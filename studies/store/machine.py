@@ -40,7 +40,6 @@ class Machine:
 
 @cache
 def this_machine() -> Machine:
-    """The machine that runs this process."""
     cpu, virtual = _cpu()
     architecture, cores, memory = platform.machine(), os.cpu_count() or 1, _memory_gb()
     hardware = json.dumps([cpu, architecture, cores, memory, platform.system()])

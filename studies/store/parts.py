@@ -106,22 +106,18 @@ def _row(lengths: Any) -> str:
 
 
 def array(shape: str, kind: str, unit: str, description: str) -> FieldSpec[np.ndarray]:
-    """An array that every record has."""
     return FieldSpec(kind, unit, description, False, shape)
 
 
 def optional_array(shape: str, kind: str, unit: str, description: str) -> FieldSpec[np.ndarray | None]:
-    """An array that some records have."""
     return FieldSpec(kind, unit, description, True, shape)
 
 
 def value(of: type[T], unit: str, description: str, length: str = "") -> AttributeSpec[T]:
-    """A number or text that every record has."""
     return AttributeSpec(KINDS[of], unit, description, False, length)
 
 
 def optional_value(of: type[T], unit: str, description: str) -> AttributeSpec[T | None]:
-    """A number or text that some records have."""
     return AttributeSpec(KINDS[of], unit, description, True, "")
 
 

@@ -60,7 +60,6 @@ def timing_name(file: str, machine: str) -> str:
 
 
 def index_path(root: Path, study: str) -> Path:
-    """The file with links to all records of `study`."""
     return study_folder(root, study) / f"{study}.h5"
 
 

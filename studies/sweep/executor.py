@@ -15,35 +15,25 @@ CompileListener = Callable[[str], object]
 class Progress(Protocol):
     """Who wants to know how far a sweep is."""
 
-    def begin(self, what: str, total: int) -> None:
-        """A stage of `total` jobs begins."""
-        ...
+    def begin(self, what: str, total: int) -> None: ...
 
-    def advance(self, what: str, note: str) -> None:
-        """One job is done."""
-        ...
+    def advance(self, what: str, note: str) -> None: ...
 
 
 class Silent:
     """Progress that nobody follows."""
 
-    def begin(self, what: str, total: int) -> None:
-        """Nothing is shown."""
+    def begin(self, what: str, total: int) -> None: ...
 
-    def advance(self, what: str, note: str) -> None:
-        """Nothing is shown."""
+    def advance(self, what: str, note: str) -> None: ...
 
 
 class Executor(Protocol):
     """Does jobs, each in a process that may die. A context manager: what it began has ended when it is left."""
 
-    def __enter__(self) -> "Executor":
-        """Begins nothing yet."""
-        ...
+    def __enter__(self) -> "Executor": ...
 
-    def __exit__(self, *error: object) -> None:
-        """Ends what it began."""
-        ...
+    def __exit__(self, *error: object) -> None: ...
 
     @property
     def processes(self) -> int:

@@ -105,8 +105,6 @@ class Job(ABC):
 
 @dataclass(frozen=True)
 class CaseJob(Job):
-    """A case of a study."""
-
     work: Case
     kind = "case"
 
@@ -147,7 +145,6 @@ class ReferenceJob(Job):
 
     @cached_property
     def _published(self) -> Entry | None:
-        """Its entry among the published references."""
         return published(self.work.scene)
 
     @property
@@ -191,12 +188,10 @@ def do(job: Job) -> Path:
 
 
 def case_jobs(root: Path, study: Study) -> list[CaseJob]:
-    """A job per case, in the order of the study."""
     return [CaseJob(root, study.name, case) for case in study.cases]
 
 
 def reference_jobs(root: Path, scenes: Iterable[Scene]) -> list[ReferenceJob]:
-    """A job per reference of the scenes."""
     return [ReferenceJob(root, REFERENCES, one) for scene in scenes for one in reference_solves(scene)]
 
 

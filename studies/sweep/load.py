@@ -96,7 +96,6 @@ def load_run(references: References, job: CaseJob) -> tuple[Run | None, list[Stu
 
 
 def not_stored(root: Path, job: CaseJob) -> StudyError:
-    """The error of a case without a file."""
     return StudyError(f"case {job.label} {'is missing in the archive' if is_archive(root) else 'has not run'}")
 
 

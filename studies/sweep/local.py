@@ -31,7 +31,6 @@ def begin(files: tuple[Given, ...], tell: Tell) -> None:
 
 
 def files_for(jobs: Sequence[Job]) -> tuple[Given, ...]:
-    """The user's files that jobs need."""
     return given_files(job.work for job in jobs if isinstance(job, CaseJob))
 
 
@@ -56,7 +55,6 @@ class Local:
         """Its processes end with each sweep."""
 
     def map(self, jobs: Sequence[Job], on_compile: CompileListener) -> Generator[tuple[Job, str | None]]:
-        """As every executor."""
         prepare = partial(begin, files_for(jobs))
         for ended in run_each(jobs, self.processes, do, prepare, environment(), on_compile):
             yield ended.job, ended.cause
@@ -64,5 +62,4 @@ class Local:
     def measure(
         self, ledger: Ledger, study: Study, progress: Progress, on_compile: CompileListener, among: set[Path] | None
     ) -> int:
-        """As every executor: in this process."""
         return measure_times(ledger, study, progress, on_compile, among)

@@ -38,7 +38,6 @@ def standings(ledger: Ledger, study: Study) -> list[Standing]:
 
 
 def standing_of(ledger: Ledger, job: Job) -> Standing:
-    """How a job stands."""
     entry, why = ledger.entry(job), ledger.why(job)
     if entry is None or why is not None:
         return Standing(job, "missing" if why == MISSING else "stale", why or MISSING, entry)

@@ -42,7 +42,6 @@ class Variant:
 
     @property
     def name(self) -> str:
-        """As it is shown."""
         default, settings = type(self.method)(), fields(self.method)  # pyright: ignore[reportArgumentType]
         values = {field.name: getattr(self.method, field.name) for field in settings}
         changed = [f"{name}={value}" for name, value in values.items() if value != getattr(default, name)]

@@ -63,7 +63,6 @@ def stamp(whole: bool) -> Path:
 
 
 def is_done(whole: bool) -> bool:
-    """Whether all of it was compiled before."""
     return stamp(True).is_file() or (not whole and stamp(False).is_file())
 
 

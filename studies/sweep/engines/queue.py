@@ -147,7 +147,6 @@ def cluster_of(settings: Settings, folder: Path) -> SpecCluster:
 
 
 def _words(settings: Settings, folder: Path) -> dict[str, Any]:
-    """Arguments of dask-jobqueue."""
     memory = settings.memory_gb or MEMORY_GB * settings.processes
     words: dict[str, Any] = {
         "cores": settings.processes,
