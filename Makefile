@@ -47,7 +47,6 @@ publish: setup-verify compiled ## all that is published, again, by this machine 
 	$(BIN)/python -m studies.lab.league
 	$(BIN)/python -m studies.lab.publish
 	$(BIN)/python -m studies.lab.methods_page
-	$(BIN)/python -m studies.cli.commands_page
 
 draw: setup-run ## ten published rows, drawn at random, run again and compared (minutes; SEED=7 repeats a draw)
 	$(BIN)/python -m studies.lab.publish.draw $(if $(SEED),--seed $(SEED))

@@ -20,7 +20,7 @@ PAGES = (*(ROOT / name for name in ("README.md", "CHANGELOG.md", "CONTRIBUTING.m
 FENCE = re.compile(r"```python\n(.*?)```", re.DOTALL)
 HISTORY, LONG = (
     "CHANGELOG.md",
-    ("CHANGELOG.md", "CONTRIBUTING.md", "theory.md", "commands.md", "results.md", "cutting.md"),
+    ("CHANGELOG.md", "CONTRIBUTING.md", "theory.md", "results.md", "cutting.md"),
 )
 QUOTED = "methods.md"
 """Shows docstrings of the solvers."""

@@ -25,7 +25,7 @@ MENU = {
         *("CONTRIBUTING", "troubleshooting"),
     ),
     "Theory": ("theory", "paper", "breaking", "limits"),
-    "Reference": ("findings", "commands", "methods", "results", "report", "meshes", "notation", "how-a-run-works"),
+    "Reference": ("findings", "methods", "results", "report", "meshes", "notation", "how-a-run-works"),
 }
 """Pages of docs/, and of the root, in the order of the menu; further ones follow in its last part."""
 ROOT_PAGES = ("CONTRIBUTING", "SECURITY", "CHANGELOG")

@@ -12,7 +12,6 @@ from typer.testing import CliRunner
 
 from studies.cli import app as cli
 from studies.cli import commands
-from studies.cli.commands_page import PAGE, commands_page
 from studies.cli.groups import FORMER, GROUPS
 
 LINES = {command.name for command in cli.app.registered_commands}
@@ -26,10 +25,6 @@ def test_every_module_of_a_command_is_listed_in_a_short_group():
     shown = CliRunner().invoke(cli.app, [], env={"COLUMNS": "80"}).output
     assert [group for group in GROUPS if f"─ {group} ─" not in shown] == []
     assert [name for name in LINES if not re.search(rf"^│ {name} +[A-Z]", shown, re.M)] == []
-
-
-def test_the_page_of_commands_is_up_to_date():
-    assert PAGE.read_text(encoding="utf-8") == commands_page(), "run python -m studies.cli.commands_page"
 
 
 @pytest.mark.parametrize("name", FORMER)
