@@ -35,9 +35,11 @@ from tests.massspring import rows
 from tests.massspring.body import test_laws
 from tests.massspring.conftest import SOFT, ball_body, block, block_body, body_of, hollow_body  # noqa: F401
 from tests.massspring.methods import test_capabilities, test_methods
-from tests.studies.catalog import test_catalog, test_metrics, test_scenes
+from tests.studies.catalog import test_catalog
 from tests.studies.geometry.organs import test_shapes
+from tests.studies.metrics import test_metric
 from tests.studies.plots import test_contract
+from tests.studies.scene import test_library
 from tests.studies.tiny import Silent
 from tests.test_docs import code
 
@@ -108,20 +110,20 @@ def test_an_added_metric_keeps_the_contract(recipe, add):
     added = recipe("metric").ADDED
     add(METRICS, added)
     status = [Status.DIVERGED, Status.TIMED_OUT, Status.FAILED, Status.NOT_CONVERGED]
-    assert hold(test_metrics, "entry", entry=[added], status=status) == 4
-    test_metrics.test_names_are_unique_and_studies_use_known_ones()
-    assert test_metrics.metric("volume_mean") is added
+    assert hold(test_metric, "entry", entry=[added], status=status) == 4
+    test_metric.test_names_are_unique_and_studies_use_known_ones()
+    assert test_metric.metric("volume_mean") is added
 
 
 def test_a_metric_of_a_new_quantity_has_a_floor_to_be_tested_with(recipe, add):
     add(METRICS, replace(recipe("metric").ADDED, quantity="curvature"))
-    assert "curvature" in test_metrics.run().reference.total_uncertainty
+    assert "curvature" in test_metric.run().reference.total_uncertainty
 
 
 def test_an_added_scene_keeps_the_contract(recipe, add):
     scene = recipe("scene").ADDED
     add(SCENES, scene)
-    assert hold(test_scenes, "scene", scene=[scene], kind=("tetrahedral", "surface")) >= 7
+    assert hold(test_library, "scene", scene=[scene], kind=("tetrahedral", "surface")) >= 7
     assert scene not in JUDGED
     record = measure(Case(scene, TetrahedralBody(nodes=100), frames=10))
     assert record.status in (Status.OK, Status.INVERTED), record.message  # so few nodes invert under their weight
@@ -204,7 +206,7 @@ def test_an_added_study_keeps_the_contract(recipe, add):
     add(STUDIES, study)
     assert hold(test_catalog, "study", study=[study]) >= 6
     test_catalog.test_names_can_be_folders_and_are_unique()
-    test_metrics.test_names_are_unique_and_studies_use_known_ones()
+    test_metric.test_names_are_unique_and_studies_use_known_ones()
     assert study in find_studies([]) and study in find_studies(["main"]) and find_studies(["node_count"]) == [study]
     assert set(test_contract.good_runs((study,))) <= set(test_contract.GOOD)
 

@@ -18,7 +18,7 @@ from studies.reference.nested import problem_of
 from studies.reference.problem import kept_obstacles, reference_problem
 from studies.scene.library import JUDGED, SCENES
 from tests.campaigns import campaigns_but
-from tests.studies.catalog.test_scenes import SMALL, THIN, small_setup
+from tests.studies.scene.test_library import SMALL, THIN, small_setup
 from tests.studies.tiny import quick_to_mesh
 
 
