@@ -7,20 +7,8 @@ from typing import Any
 import numpy as np
 
 from massspring import Obstacle, Plane, Trajectory
+from studies.exchange import words
 from studies.exchange.meshes import GivenMesh
-from studies.exchange.words import (
-    DAMPING,
-    DAMPING_OF_MOTION,
-    MATERIAL,
-    PATHS,
-    cut_words,
-    force_words,
-    friction_words,
-    lumen_words,
-    moved,
-    obstacle_words,
-    start_words,
-)
 from studies.metrics.metric import Metric
 from studies.metrics.metrics import METRICS
 from studies.scene.quantities import allowed
@@ -65,12 +53,12 @@ def description(scene: Scene, meshes: Sequence[GivenMesh], why_not_curved: str) 
             "shear_modulus": tissue.shear_modulus,
             "bulk_modulus": tissue.shear_modulus * tissue.bulk_over_shear,
             "density": tissue.density,
-            "words": MATERIAL,
+            "words": words.MATERIAL,
             "source": tissue.source,
         },
         "gravity": list(scene.gravity),
-        "damping": {"rate": scene.damping, "words": DAMPING_OF_MOTION if moves else DAMPING},
-        "start": {"words": start_words(scene), "speed": start and start.speed},
+        "damping": {"rate": scene.damping, "words": words.DAMPING_OF_MOTION if moves else words.DAMPING},
+        "start": {"words": words.start_words(scene), "speed": start and start.speed},
         "duration": scene.duration,
         "frames": scene.frames,
         "checkpoints": list(scene.checkpoints),
@@ -78,19 +66,19 @@ def description(scene: Scene, meshes: Sequence[GivenMesh], why_not_curved: str) 
             {"name": held.name, "point_data": HELD + held.name, "path": path_entry(held.path)} for held in scene.held
         ],
         "obstacles": [obstacle_entry(obstacle) for obstacle in scene.obstacles],
-        "paths": {"file": FILES["paths"], "words": PATHS},
+        "paths": {"file": FILES["paths"], "words": words.PATHS},
         "lumen": lumen
         and {
             "content": lumen.content,
             "volume": {"times": list(lumen.filling.times), "factors": list(lumen.filling.values)},
-            "words": lumen_words(lumen),
+            "words": words.lumen_words(lumen),
         },
         "cut": cut_entry(scene),
         "force": {
             "of": scene.probed.what,
             "number": scene.probed.number,
             "direction": list(scene.probed.direction),
-            "words": force_words(scene),
+            "words": words.force_words(scene),
         },
         "judged": [
             {"name": one.name, "unit": one.unit, "definition": one.description, "better": BETTER[one.better]}
@@ -114,7 +102,8 @@ def mesh_entry(mesh: GivenMesh) -> dict[str, Any]:
 
 def path_entry(path: Trajectory) -> dict[str, Any]:
     """Key times and displacements, and the same in words."""
-    return {"times": list(path.times), "displacements": np.array(path.displacements).tolist(), "words": moved(path)}
+    ways = np.array(path.displacements).tolist()
+    return {"times": list(path.times), "displacements": ways, "words": words.moved(path)}
 
 
 def obstacle_entry(obstacle: Obstacle) -> dict[str, Any]:
@@ -124,8 +113,8 @@ def obstacle_entry(obstacle: Obstacle) -> dict[str, Any]:
     entry |= {name: list(value) if isinstance(value, tuple) else value for name, value in shape.items()}
     if isinstance(obstacle, Plane):
         entry["normal"] = obstacle.unit_normal.tolist()
-    words = {"friction_words": friction_words(obstacle), "words": obstacle_words(obstacle)}
-    return entry | {"path": path_entry(obstacle.path)} | words
+    entry["path"] = path_entry(obstacle.path)
+    return entry | {"friction_words": words.friction_words(obstacle), "words": words.obstacle_words(obstacle)}
 
 
 def cut_entry(scene: Scene) -> dict[str, Any] | None:
@@ -136,4 +125,4 @@ def cut_entry(scene: Scene) -> dict[str, Any] | None:
     blade = cut.within and {"kind": type(cut.within).__name__.lower()} | asdict(cut.within)
     plane = {"point": list(cut.plane.point), "normal": list(cut.plane.normal)}
     numbers = {"name": cut.name, "plane": plane, "within": blade, "contact": cut.contact}
-    return numbers | {"files": CUT_FILES, "words": cut_words(cut)}
+    return numbers | {"files": CUT_FILES, "words": words.cut_words(cut)}

@@ -147,8 +147,8 @@ def _read_pvd(path: Path) -> Handed:
     rows = sorted((float(entry.attrib["timestep"]), entry.attrib["file"]) for entry in sets)
     if not rows:
         raise StudyError(f"{path.name} names no files")
-    grids = [read_points(path.parent / name) for _, name in rows]
-    return Handed(path.name, np.array([t for t, _ in rows]), _of_grids(path.name, grids), {})
+    positions = _of_grids(path.name, [path.parent / name for _, name in rows])
+    return Handed(path.name, np.array([t for t, _ in rows]), positions, {})
 
 
 def _read_series(path: Path) -> Handed:
@@ -156,10 +156,11 @@ def _read_series(path: Path) -> Handed:
     files = sorted(folder.glob(pattern))
     if not files:
         raise StudyError(f"{folder} holds no file {pattern}")
-    return Handed(path.name, None, _of_grids(path.name, [read_points(file) for file in files]), {})
+    return Handed(path.name, None, _of_grids(path.name, files), {})
 
 
-def _of_grids(name: str, grids: Sequence[tuple[np.ndarray, dict[str, np.ndarray]]]) -> np.ndarray:
+def _of_grids(name: str, files: Sequence[Path]) -> np.ndarray:
+    grids = [read_points(file) for file in files]
     return _stacked(name, [points for points, _ in grids], [data.get(DISPLACEMENT) for _, data in grids])
 
 
