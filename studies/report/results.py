@@ -19,7 +19,7 @@ from studies.report.league import write_league
 from studies.report.page.part import read_part, write_part
 from studies.report.page.write import write_page
 from studies.report.references import refresh_uncertainty, state_of
-from studies.report.summaries import SUMMARIES
+from studies.report.summary import SUMMARIES
 from studies.runs.paper import play, slide_case, squeezed_balls
 from studies.runs.user_code import fault_of, file_of
 from studies.store.archived import is_archive, shown_machine

@@ -1,7 +1,7 @@
 """Tables for people to read, in Markdown: the results of `make study`, the recommended bodies, and the accuracy of
 each rung of the ladder of bodies."""
 
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 from studies.metrics.cells import MISSING, UNRESOLVED_MARK, UNRESOLVED_NOTE, value_cell
@@ -153,3 +153,10 @@ def _percent(error: Measured, signed: bool) -> str:
 
 def _real_time(one: Judged) -> str:
     return value_cell(1.0 / one.cost.value) if one.cost.known else MISSING
+
+
+SUMMARIES: dict[str, dict[str, Callable[[Sequence[Run]], str]]] = {
+    "volume_loss": {"summary.md": results_of},
+    "accuracy": {"accuracy/recommended.md": recommended_of, "accuracy/ladder.md": ladder_of},
+}
+"""Study -> file below the results folder -> its text."""

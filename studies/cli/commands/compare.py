@@ -9,9 +9,8 @@ from rich.table import Table
 
 from studies.cli.terminal import console, say
 from studies.metrics.cells import MISSING, plain
-from studies.metrics.compare.folders import Change, Comparison, labels_of
-from studies.metrics.compare.folders import compare as compared
-from studies.metrics.compare.verdict import Verdict
+from studies.metrics.compare_folders import Change, Comparison, Verdict, labels_of
+from studies.metrics.compare_folders import compare as compared
 from studies.store.tables import write_table
 
 SHOWN = 40

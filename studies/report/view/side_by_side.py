@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from studies.base.errors import StudyError
-from studies.report.view.body import Shown
+from studies.report.view.bodies import Shown
 
 GAP = 1.25
 """From one body to the next, over the size of the largest."""

@@ -9,8 +9,7 @@ import numpy as np
 from studies.base.errors import StudyError
 from studies.metrics.run import Run
 from studies.reference.solution import Solution
-from studies.report.view.body import Shown
-from studies.report.view.from_records import shown_reference, shown_run
+from studies.report.view.bodies import Shown, shown_reference, shown_run
 from studies.report.view.stored import Stored, chosen_runs, finest_reference, stored_runs
 from studies.runs.case import Case
 from studies.scene.as_json import scene_of_key

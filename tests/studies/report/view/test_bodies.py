@@ -8,8 +8,7 @@ import pytest
 
 from studies.base.errors import StudyError
 from studies.reference.solution import Solution
-from studies.report.view.body import QUADRATIC_TETRAHEDRON, TETRAHEDRON, TRIANGLE
-from studies.report.view.from_records import shown_reference, shown_run
+from studies.report.view.bodies import QUADRATIC_TETRAHEDRON, TETRAHEDRON, TRIANGLE, shown_reference, shown_run
 from studies.report.view.side_by_side import side_by_side
 from tests.studies.made_up_run import CELLS, EDGE, POINTS, SCENE, TRIANGLES, bend, run
 from tests.studies.octant import SCENE as OCTANT

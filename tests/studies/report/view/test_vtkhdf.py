@@ -6,7 +6,7 @@ import pytest
 
 from studies.base.errors import StudyError
 from studies.reference.solution import Solution
-from studies.report.view.from_records import shown_reference, shown_run
+from studies.report.view.bodies import shown_reference, shown_run
 from studies.report.view.side_by_side import Grid, side_by_side
 from studies.report.view.vtkhdf import write_grid
 from tests.studies.made_up_run import SCENE, run

@@ -10,13 +10,12 @@ import pytest
 
 from studies.base.errors import StudyError
 from studies.cli.commands.compare import rows_of
-from studies.metrics.compare.folders import compare, equal_records
-from studies.metrics.compare.verdict import ROUND_OFF, Verdict, verdict_of
+from studies.metrics.compare_folders import ROUND_OFF, Verdict, compare, equal_records, verdict_of
 from studies.store.paths import record_files
 from studies.store.record import read_record, write_record
 from studies.store.tables import write_table
 
-PUBLISHED = Path(__file__).parents[4] / "results" / "published"
+PUBLISHED = Path(__file__).parents[3] / "results" / "published"
 NAN = float("nan")
 
 

@@ -1,9 +1,10 @@
-"""The tables of two results folders, row by row: the same study, scene and recipe, metric by metric."""
+"""The tables of two results folders, row by row, metric by metric, and what a change means given its uncertainty."""
 
 import re
 from collections import defaultdict
 from collections.abc import Hashable, Iterable
 from dataclasses import dataclass, fields, replace
+from enum import StrEnum
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -11,7 +12,6 @@ import numpy as np
 import pandas as pd
 
 from studies.base.errors import StudyError
-from studies.metrics.compare.verdict import Verdict, verdict_of
 from studies.metrics.metrics import METRICS
 from studies.runs.case import case_from_json
 from studies.runs.recipe_text import recipe_text
@@ -19,6 +19,46 @@ from studies.scene.quantities import ALWAYS
 from studies.store.machine import machine_of
 from studies.store.paths import record_files
 from studies.store.record import Record, read_record
+
+ROUND_OFF = 1e-5
+"""Relative difference below which numbers are equal: tables have six digits."""
+
+
+class Verdict(StrEnum):
+    """Relation of a number in one folder to that in the other."""
+
+    SAME_BITS = "same bits"
+    ROUND_OFF = "round-off"
+    WITHIN_FLOOR = "within floor"
+    MOVED = "moved"
+    NOT_RESOLVABLE = "not resolvable"
+    OTHER_MACHINE = "other machine"
+    OTHER_REFERENCE = "other reference"
+
+
+MEANING: dict[Verdict, str] = {
+    Verdict.SAME_BITS: "the records of both folders are equal to the last bit, and so are the numbers",
+    Verdict.ROUND_OFF: f"equal to a relative {ROUND_OFF:g}, which is what a table shows",
+    Verdict.WITHIN_FLOOR: "the change is within the uncertainty of the reference, or within the spread of the timing",
+    Verdict.MOVED: "the change is larger than that uncertainty",
+    Verdict.NOT_RESOLVABLE: "the number has no stated uncertainty, or one folder lacks it",
+    Verdict.OTHER_MACHINE: "a time from another machine; it is not compared",
+    Verdict.OTHER_REFERENCE: "an error against another reference, or another published set; it is not compared",
+}
+
+
+def verdict_of(old: float, new: float, floor: float, same_bits: bool) -> Verdict:
+    """The verdict on a number that was `old` and is `new`. floor: its uncertainty, NaN if none is stated; same_bits:
+    whether the records from which it was computed are equal."""
+    change = abs(new - old)
+    if change != change:
+        return Verdict.NOT_RESOLVABLE
+    if change <= ROUND_OFF * max(abs(old), abs(new)):
+        return Verdict.SAME_BITS if same_bits and change == 0.0 else Verdict.ROUND_OFF
+    if floor != floor:
+        return Verdict.NOT_RESOLVABLE
+    return Verdict.WITHIN_FLOOR if change <= floor else Verdict.MOVED
+
 
 Key = tuple[str, str]
 """Scene and recipe."""

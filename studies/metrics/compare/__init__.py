@@ -1,1 +1,0 @@
-"""Compares two results folders: changes between two versions, machines or users."""
