@@ -167,13 +167,13 @@ def travel(scene, leg=1) -> float:
 PRESSED = re.compile(r"(?:pressed|pushed in by) (\d+) mm")
 
 
-@pytest.mark.parametrize("scene", [s for s in SCENES if PRESSED.search(s.title)], ids=lambda s: s.name)
-def test_a_press_is_as_deep_as_the_title_says(scene):
+@pytest.mark.parametrize("pressed", [s for s in SCENES if PRESSED.search(s.title)], ids=lambda s: s.name)
+def test_a_press_is_as_deep_as_the_title_says(pressed):
     """The way begins outside the organ, up to 2 mm from it; a probe has the radius of the title."""
-    (depth,) = PRESSED.findall(scene.title)
-    assert 0 <= travel(scene) - 1e-3 * float(depth) <= 2e-3
-    for radius in re.findall(r"spherical probe of (\d+) mm radius", scene.title):
-        assert [o.radius for o in scene.obstacles if hasattr(o, "centre")] == [pytest.approx(1e-3 * float(radius))]
+    (depth,) = PRESSED.findall(pressed.title)
+    assert 0 <= travel(pressed) - 1e-3 * float(depth) <= 2e-3
+    for radius in re.findall(r"spherical probe of (\d+) mm radius", pressed.title):
+        assert [o.radius for o in pressed.obstacles if hasattr(o, "centre")] == [pytest.approx(1e-3 * float(radius))]
 
 
 def test_the_other_loads_are_those_of_the_titles():
@@ -195,18 +195,18 @@ def test_tissue_is_as_nearly_incompressible_as_the_theory_says():
     assert {scene.tissue.bulk_over_shear for scene in SCENES} == {float(ratio)}
 
 
-PROBES = pytest.mark.parametrize("scene", [LIVER_PROBE, KIDNEY_PROBE, STOMACH_PROBE], ids=lambda scene: scene.name)
+PROBES = pytest.mark.parametrize("probing", [LIVER_PROBE, KIDNEY_PROBE, STOMACH_PROBE], ids=lambda scene: scene.name)
 
 
 @PROBES
-def test_a_probe_starts_half_a_millimetre_from_the_surface(scene):
-    shape, probe = SHAPES[scene.organ.shape](), scene.obstacles[0]
-    outward = -np.asarray(scene.probed.direction)
+def test_a_probe_starts_half_a_millimetre_from_the_surface(probing):
+    shape, probe = SHAPES[probing.organ.shape](), probing.obstacles[0]
+    outward = -np.asarray(probing.probed.direction)
     point = np.asarray(probe.centre) - (probe.radius + 0.0005) * outward
     assert shape.level(point[None])[0] == pytest.approx(0.0, abs=1e-12)
     assert outward == pytest.approx(normals(shape, point[None])[0], abs=1e-9)
 
 
 @PROBES
-def test_its_reference_is_published(scene):
-    assert published(scene) is not None
+def test_its_reference_is_published(probing):
+    assert published(probing) is not None
