@@ -7,13 +7,12 @@ from html import unescape
 
 import pytest
 
-from studies.base.errors import StudyError
 from studies.catalog.study import Study, command_line
 from studies.runs import user_code
 from studies.store.paths import record_files
 from studies.sweep.find_scene import find_scene
 from studies.sweep.find_study import find_study
-from tests.studies.tiny import SQUEEZE, tiny_study
+from tests.studies.tiny import tiny_study
 from tests.test_docs import code
 
 TOP = "from dataclasses import replace\nfrom tests.studies.tiny import *\n"
@@ -30,54 +29,6 @@ def write(tmp_path):
         return str(path)
 
     return written
-
-
-@pytest.mark.parametrize(
-    ("parts", "word", "name"),
-    [
-        ((SCENE,), "", "alone"),
-        ((STUDY,), "", SQUEEZE.name),
-        ((SEVERAL,), ":other", "other"),
-        ((SEVERAL, SCENE), "", "alone"),
-        ((SEVERAL, SCENE), f":{SQUEEZE.name}", SQUEEZE.name),
-    ],
-)
-def test_a_scene_is_read_from_a_file(write, parts, word, name):
-    assert find_scene(write(*parts) + word).name == name
-
-
-def test_of_several_scenes_a_sentence_asks_which(write):
-    path = write(SEVERAL)
-    with pytest.raises(
-        StudyError, match=f"has 2 scenes: tiny_squeeze, other; name one of them, as {path}:tiny_squeeze"
-    ):
-        find_scene(path)
-    with pytest.raises(StudyError, match=r"unknown scene of .*mine.py 'othr'; did you mean 'other'"):
-        find_scene(f"{path}:othr")
-
-
-def test_a_scene_that_cannot_start_is_refused_by_every_command(write):
-    with pytest.raises(StudyError, match="frames is 0; give a whole number from 1 on"):
-        find_scene(write("SCENE = replace(SQUEEZE, frames=0)\n"))
-
-
-@pytest.mark.parametrize("text", ["STUDY = replace(tiny_study(), name=7)", "STUDY = replace(tiny_study(), question=5)"])
-def test_a_study_has_a_name_and_a_question_in_words(write, text):
-    with pytest.raises(StudyError, match=r"of a study is [57]; give a text"):
-        find_study(write(text))
-
-
-def test_a_scene_alone_is_a_study_of_four_bodies_with_charts(write):
-    study = find_study(write(SCENE))
-    assert study.name == "alone" and study.charts and [scene.name for scene in study.scenes] == ["alone"]
-    assert [(case.body.kind, case.method.name, case.recorded) for case in study.cases] == [
-        ("tetrahedral", "free", ("surface",)),
-        ("tetrahedral", "implicit_volume", ("surface",)),
-        ("quadratic", "implicit_volume", ("surface",)),
-        ("quadratic", "implicit_volume", ("surface",)),
-    ]
-    assert len({case.body.nodes for case in study.cases[-2:]}) == 2  # whose difference says whether to trust them
-    assert {"force_end", "mean_error", "shape_error", "shape_volume"} <= set(study.columns)
 
 
 @pytest.mark.parametrize(

@@ -20,7 +20,7 @@ pytestmark = [
     pytest.mark.skipif(os.name != "posix", reason="signals and process groups"),
     pytest.mark.usefixtures("heard"),
 ]
-REPOSITORY = Path(__file__).parents[4]
+REPOSITORY = Path(__file__).parents[3]
 SAID = "organbench: interrupted; finished work is stored; run the same command to continue"
 
 

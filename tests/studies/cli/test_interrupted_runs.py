@@ -13,7 +13,7 @@ from studies.store.paths import record_files
 from studies.store.record import Status, peek
 from studies.sweep.run_studies import run_studies
 from studies.sweep.standings import standings
-from tests.studies.cli.running.test_interrupts import REPOSITORY, SAID
+from tests.studies.cli.test_interrupts import REPOSITORY, SAID
 from tests.studies.tiny import Silent, tiny_case, tiny_study
 
 pytestmark = [

@@ -15,10 +15,10 @@ from tests.studies.tools.advise.made_up_campaign import GRADED, LADDER, publish,
 STUDY = """
 from dataclasses import replace
 from massspring import ImplicitVolume
-from studies import BALL_CLAMPED, LIVER_PROBE, Case, Study, TetrahedralBody
+from studies import LIVER_PROBE, Case, Study, TetrahedralBody
 
 MINE = replace(LIVER_PROBE, name="mine", duration=9.0, reference=None)
-STUDY = Study("mine", "Does it run?", tuple(Case(s, TetrahedralBody(), ImplicitVolume()) for s in {scenes}), (), ())
+STUDY = Study("mine", "Does it run?", tuple(Case(s, TetrahedralBody(), ImplicitVolume()) for s in [MINE]), (), ())
 """
 
 
@@ -67,7 +67,7 @@ def test_a_wish_within_the_uncertainty_has_a_remark(advise):
 
 def test_a_scene_of_the_user_gets_the_worst_of_its_kind(advise, tmp_path):
     file = tmp_path / "mine.py"
-    file.write_text(STUDY.format(scenes="[MINE]"))
+    file.write_text(STUDY)
     out = advise(file, "--no-timing")
     assert "no run of this scene is stored: errors, shape and step are the worst of liver_probe, kidney_probe" in out
     assert "on another machine" in out and "in Python     Case(scene, QuadraticBody(nodes" in out
@@ -116,21 +116,3 @@ def test_in_an_empty_folder_the_tables_of_the_program_count(organbench, tmp_path
     # A table of one's own comes first.
     publish(Path("results"), rows_of(LIVER_PRESS))
     assert "nodes=994" in organbench("advise", "liver_press", "--no-timing")[1]
-
-
-def test_a_file_of_two_scenes_is_one_sentence(refused, tmp_path):
-    file = tmp_path / "two.py"
-    file.write_text(STUDY.format(scenes="[MINE, BALL_CLAMPED]"))
-    assert "has 2 scenes: mine, ball_clamped; name one of them" in refused("advise", file, "--results", tmp_path)
-
-
-def test_a_case_that_there_is_not_is_answered_with_the_nearest(refused, tmp_path):
-    name = ACCURACY.cases[0].name
-    sentence = refused("run", "accuracy", "--case", f"{name}x", "--results", tmp_path)
-    assert f"unknown case of accuracy '{name}x'; did you mean '{name}'" in sentence
-
-
-def test_one_case_of_a_study_can_be_run(organbench, tmp_path):
-    case = next(c for c in ACCURACY.cases if c.scene == LIVER_PRESS)
-    code, out, _ = organbench("run", "accuracy", "--case", case.name, "--dry-run", "--results", tmp_path)
-    assert code == 0 and "1 case (missing)" in out and "1 timing (missing)" in out
