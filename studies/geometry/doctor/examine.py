@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from studies.geometry.doctor.findings import Finding, findings_of
-from studies.geometry.doctor.measures import describe_springs, describe_surface, describe_tetrahedra, describe_welding
+from studies.geometry.doctor.measures import describe_springs, describe_surface, describe_tetrahedra
 from studies.geometry.files.content import Content, parts_in
 from studies.geometry.files.opening import opened
 from studies.geometry.files.reading import weld
@@ -57,13 +57,18 @@ def examine(
     content = opened(file)
     used, metres = unit_of(file, content)
     check_range(content.longest_side * metres, file.path.name)
-    # An STL file repeats the corners of every triangle, which is no fault.
-    repeats = file.path.suffix.lower() == ".stl"
-    welding = describe_welding(content.points, content.cells, repeats)
     points, cells = content.points, content.cells
-    if not welding["bad_points"]:
+    count = len(np.unique(cells))
+    welding: dict[str, Any] = {
+        "points_in_file": len(points),
+        "unused_points": len(points) - count,
+        "duplicate_points": 0,
+    }
+    if np.isfinite(points).all():
         welding["part_list"] = parts_in(content, metres)
         points, cells = weld(points, cells)
+        # An STL file repeats the corners of every triangle, which is no fault.
+        welding["duplicate_points"] = 0 if file.path.suffix.lower() == ".stl" else count - len(points)
     return examine_cells(file.path.name, points * metres, cells, used | welding, tissue)
 
 

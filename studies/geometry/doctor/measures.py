@@ -7,7 +7,6 @@ from scipy.spatial.distance import pdist
 
 from massspring import MassSpringError, Material, step_limit, surface_body, tetrahedral_body
 from studies.base.errors import StudyError
-from studies.geometry.files.reading import weld
 from studies.geometry.mesh.checks import SLIVER, pinched_nodes
 from studies.geometry.mesh.organ_mesh import (
     connected,
@@ -25,18 +24,6 @@ MEASURED_BODY = 6000
 """Most nodes of a body for which the largest frequency of the springs is computed, which takes seconds."""
 RIM = 500
 """Most nodes of a border between which distances are measured; of more, every k-th is taken."""
-
-
-def describe_welding(points: np.ndarray, cells: np.ndarray, repeats: bool) -> dict[str, Any]:
-    """Numbers of points in a file before welding: not finite, in all, unused, and duplicate.
-
-    repeats: whether the format repeats points, which then do not count as duplicates.
-    """
-    bad = int((~np.isfinite(points).all(axis=1)).sum())
-    used = len(np.unique(cells))
-    twice = 0 if bad or repeats else used - len(weld(points, cells)[0])
-    unused = len(points) - used
-    return {"bad_points": bad, "points_in_file": len(points), "unused_points": unused, "duplicate_points": twice}
 
 
 def describe_surface(points: np.ndarray, triangles: np.ndarray) -> dict[str, Any]:

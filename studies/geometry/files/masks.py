@@ -80,7 +80,7 @@ def load_nifti(path: Path) -> Mask:
         raise missing("nibabel", path) from error
     image: Any = nibabel.load(path)
     unit_name = image.header.get_xyzt_units()[0] if hasattr(image.header, "get_xyzt_units") else ""
-    labels, unit = whole_numbers(np.asanyarray(image.dataobj), path), unit_of(unit_name)
+    labels, unit = whole_numbers(np.asanyarray(image.dataobj), path), LONG_NAMES.get(unit_name.lower())
     return Mask(labels, np.asarray(image.affine, float), unit or "mm", {}, by_custom=unit is None)
 
 
@@ -105,7 +105,7 @@ def load_nrrd(path: Path) -> Mask:
         if match:
             names[int(value)] = str(header.get(f"Segment{match[1]}_Name", value))
     unit_name = str(next(iter(header.get("space units", [])), "")).strip('"')
-    return Mask(labels, affine, unit_of(unit_name), names)
+    return Mask(labels, affine, LONG_NAMES.get(unit_name.lower()), names)
 
 
 def missing(name: str, path: Path) -> StudyError:
@@ -113,11 +113,6 @@ def missing(name: str, path: Path) -> StudyError:
         f"{path.name} is a label mask, and {name}, which reads it, is not installed; "
         "run pip install 'organbench[masks]'"
     )
-
-
-def unit_of(unit_name: str) -> str | None:
-    """The unit of a header as one of UNITS, or None if it states none or another."""
-    return LONG_NAMES.get(unit_name.lower())
 
 
 def whole_numbers(data: np.ndarray, path: Path) -> np.ndarray:

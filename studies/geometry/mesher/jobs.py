@@ -69,7 +69,7 @@ def surface_of(recipe: dict[str, Any]) -> dict[str, np.ndarray]:
     if recipe["kind"] != "organ" or not recipe["fill"] or cuts_of(recipe):
         return {}
     alone = {key: value for key, value in recipe.items() if key != "layers"} | {"fill": False}
-    surface = read_cached(cache_path(alone, {}), PARTS)
+    surface = stored_in(cache_path(alone, {}), PARTS)
     return {} if surface is None else {part: surface[part] for part in ("points", "triangles")}
 
 
@@ -88,11 +88,34 @@ def cached(
     """The arrays named `parts` for a recipe: from the cache, or made by `make` and stored. Raises StudyError if they
     cannot be stored."""
     path = cache_path(recipe, arrays)
-    result = read_cached(path, parts)
-    if result is None:
-        result = make()
-        write_cached(path, result)
-    return result
+    stored = stored_in(path, parts)
+    if stored is not None:
+        return stored
+    made = make()
+    try:
+        # Under a temporary name first, so that another process sees all of the file or none.
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.NamedTemporaryFile(dir=path.parent, prefix=path.stem, suffix=".part", delete=False) as part:
+            np.savez(part, allow_pickle=False, **made)
+        os.replace(part.name, path)
+    except OSError as error:
+        raise StudyError(
+            f"the mesh cannot be stored in {path.parent} ({error.strerror}); "
+            "set ORGANBENCH_CACHE to a folder that can be written"
+        ) from error
+    return made
+
+
+def stored_in(path: Path, parts: tuple[str, ...]) -> dict[str, np.ndarray] | None:
+    """The arrays of a file of the cache, or None if there is none or, with a warning, it is damaged."""
+    if not path.exists():
+        return None
+    try:
+        with np.load(path, allow_pickle=False) as data:
+            return {key: data[key] for key in parts}
+    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
+        warnings.warn(f"the cached mesh {path} is damaged ({error}); it is made again", stacklevel=3)
+        return None
 
 
 def patches_of(mesh: OrganMesh, regions: dict[str, dict[str, Any]]) -> dict[str, np.ndarray]:
@@ -139,38 +162,7 @@ def recipe_hash(recipe: dict[str, Any], arrays: dict[str, np.ndarray]) -> str:
 def code_hash(kind: str) -> str:
     """Fingerprint of the code that makes a kind of recipe, and the versions of the libraries that decide a mesh."""
     versions = " ".join(version(name) for name in ("gmsh", "mmgpy", "scikit-image", "numpy", "scipy"))
-    return f"{source_fingerprint(maker(kind))} {versions}"
-
-
-def maker(kind: str) -> str:
-    return MADE_ELSEWHERE.get(kind, MAKERS[0])
-
-
-def read_cached(path: Path, parts: tuple[str, ...]) -> dict[str, np.ndarray] | None:
-    """The stored arrays, or None if there is no file or it is damaged. Warns of a damaged file."""
-    if not path.exists():
-        return None
-    try:
-        with np.load(path, allow_pickle=False) as data:
-            return {key: data[key] for key in parts}
-    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
-        warnings.warn(f"the cached mesh {path} is damaged ({error}); it is made again", stacklevel=3)
-        return None
-
-
-def write_cached(path: Path, arrays: dict[str, np.ndarray]) -> None:
-    """Stores arrays under a temporary name and renames the file, so that another process sees all of it or none. Raises
-    StudyError if it cannot be stored."""
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.NamedTemporaryFile(dir=path.parent, prefix=path.stem, suffix=".part", delete=False) as part:
-            np.savez(part, allow_pickle=False, **arrays)
-        os.replace(part.name, path)
-    except OSError as error:
-        raise StudyError(
-            f"the mesh cannot be stored in {path.parent} ({error.strerror}); "
-            "set ORGANBENCH_CACHE to a folder that can be written"
-        ) from error
+    return f"{source_fingerprint(MADE_ELSEWHERE.get(kind, MAKERS[0]))} {versions}"
 
 
 def run_worker(recipe: dict[str, Any], arrays: dict[str, np.ndarray], limit: float) -> dict[str, np.ndarray]:
@@ -181,7 +173,8 @@ def run_worker(recipe: dict[str, Any], arrays: dict[str, np.ndarray], limit: flo
     with tempfile.TemporaryDirectory() as folder:
         job, out = Path(folder, "job.npz"), Path(folder, "out.npz")
         np.savez(job, allow_pickle=False, recipe=np.array(json.dumps(recipe)), **arrays)
-        command = [sys.executable, "-m", maker(recipe["kind"]), str(job), str(out), repr(limit)]
+        maker = MADE_ELSEWHERE.get(recipe["kind"], MAKERS[0])
+        command = [sys.executable, "-m", maker, str(job), str(out), repr(limit)]
         code, stage, last = followed(command, recipe["name"], limit)
         if out.exists():
             with np.load(out, allow_pickle=False) as data:

@@ -17,8 +17,8 @@ from studies.geometry.mesh.quality import triangle_radius_ratio
 from studies.geometry.shape.levelset import Shape
 from studies.geometry.shape.regions import Region
 from studies.geometry.surface.distance import ChangingFacets
-from studies.geometry.surface.edit import flip_edges, split_edge
 from studies.geometry.surface.intersections import crossing_triangles
+from studies.geometry.surface.node_count import flip_edges, split_edge
 from studies.geometry.surface.sides import (
     along_facets,
     lattice,

@@ -122,15 +122,10 @@ def segment_meets_flat(p: np.ndarray, q: np.ndarray, triangle: np.ndarray) -> np
     meets = (inside >= 0).all(axis=0) | (inside <= 0).all(axis=0)
     for s, t in ((a, b), (b, c), (c, a)):
         across = orientation_2(p, q, s) * orientation_2(p, q, t) <= 0
-        meets |= across & (orientation_2(s, t, p) * orientation_2(s, t, q) <= 0) & boxes_meet(p, q, s, t)
+        # For segments on one line their boxes decide.
+        touch = (np.minimum(p, q) <= np.maximum(s, t)) & (np.minimum(s, t) <= np.maximum(p, q))
+        meets |= across & (orientation_2(s, t, p) * orientation_2(s, t, q) <= 0) & touch.all(axis=1)
     return meets
-
-
-def boxes_meet(p: np.ndarray, q: np.ndarray, s: np.ndarray, t: np.ndarray) -> np.ndarray:
-    """Whether the boxes of segments p, q and s, t (n, 2) touch, which decides for segments on one line."""
-    low, high = np.minimum(p, q), np.maximum(p, q)
-    touch = (low <= np.maximum(s, t)) & (np.minimum(s, t) <= high)
-    return touch[:, 0] & touch[:, 1]
 
 
 def dot(u: np.ndarray, v: np.ndarray) -> np.ndarray:

@@ -12,8 +12,8 @@ from studies.geometry.mesh.organ_mesh import triangle_normals, unique_edges
 from studies.geometry.mesh.quality import triangle_radius_ratio
 from studies.geometry.shape.levelset import Level, Shape, project
 from studies.geometry.shape.regions import ON_CURVE, Region
-from studies.geometry.surface.edit import flip_edges
 from studies.geometry.surface.first_surface import neighbour_mean
+from studies.geometry.surface.node_count import flip_edges
 
 FLOORS = (0.35, 0.2, 0.1, 0.05)
 """Smallest radius ratio of a triangle that a move may leave, in successive rounds: good moves come first."""

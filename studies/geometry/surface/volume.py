@@ -64,7 +64,10 @@ def moved_to(
     points: np.ndarray, triangles: np.ndarray, volume: float, level: Level, keep: Keeper, still: np.ndarray
 ) -> np.ndarray:
     """The points moved so that the volume is met as well as possible; those of `still` (n,) bool do not move."""
-    normals, most = vertex_normals(points, triangles), FARTHEST * mean_edges(points, triangles)
+    edges, normals = unique_edges(triangles), vertex_normals(points, triangles)
+    lengths = np.linalg.norm(points[edges[:, 0]] - points[edges[:, 1]], axis=1)
+    total, count = (np.bincount(edges.ravel(), weights, len(points)) for weights in (np.repeat(lengths, 2), None))
+    most = FARTHEST * (total / np.maximum(count, 1))
     sagging, most = depth(points, triangles, level), np.where(still, 0.0, most)
     area, further = float(triangle_areas(points, triangles).sum()), 0.0
     for _ in range(ROUNDS):
@@ -96,14 +99,6 @@ def depth(points: np.ndarray, triangles: np.ndarray, level: Level) -> np.ndarray
     areas = triangle_areas(points, triangles)
     weights = np.bincount(triangles.ravel(), np.repeat(areas, 3), len(points))
     return np.bincount(triangles.ravel(), np.repeat(areas * above, 3), len(points)) / np.maximum(weights, 1e-300)
-
-
-def mean_edges(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Mean length [m] of the edges at each node, (n,)."""
-    edges = unique_edges(triangles)
-    lengths = np.linalg.norm(points[edges[:, 0]] - points[edges[:, 1]], axis=1)
-    count = np.bincount(edges.ravel(), minlength=len(points))
-    return np.bincount(edges.ravel(), np.repeat(lengths, 2), len(points)) / np.maximum(count, 1)
 
 
 def outline_keeper(points: np.ndarray, regions: Sequence[Region]) -> Keeper:

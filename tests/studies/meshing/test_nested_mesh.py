@@ -7,17 +7,17 @@ import numpy as np
 import pytest
 from skfem import MeshTet, MeshTet2
 
+from massspring.body.quadratic import PARTS_OF_FACET
 from reference_fem import NewtonSettings, facet_nodes, nodes
 from reference_fem.elements.shapes import build_elements, check_neighbours, element_nodes
 from reference_fem.system.saddle_point import System
-from studies.base.errors import StudyError
 from studies.geometry import HalfSpace
-from studies.geometry.mesh.organ_mesh import tetrahedron_volumes
+from studies.geometry.mesh.organ_mesh import tetrahedron_volumes, triangle_normals
 from studies.geometry.mesh.quality import smallest_jacobian
 from studies.lab.population.draw import member
 from studies.meshing.held_mesh import held_mesh, with_patches
 from studies.meshing.kept_shape import area_error
-from studies.meshing.nested_mesh import LEAST, LOST, SHARE, NestedMesh, at_nodes, base_mesh, marked, upright
+from studies.meshing.nested_mesh import LEAST, LOST, SHARE, NestedMesh, base_mesh, marked, upright
 from studies.meshing.scene_mesh import mesh_for
 from studies.reference.nested import problem_of
 from studies.scene.cut import Cut
@@ -59,7 +59,7 @@ def box_mesh(cells=2):
     return with_patches(mesh, [np.flatnonzero(points[:, 2] < -0.049)])
 
 
-@pytest.mark.parametrize("seed", [0, 1, 2])
+@pytest.mark.parametrize("seed", [0, 1])
 def test_halved_elements_know_their_parents(seed):
     """After one round and after four: neighbours are halved as well, some of them more than once in a round."""
     body = first = box_mesh()
@@ -74,13 +74,6 @@ def test_halved_elements_know_their_parents(seed):
         np.testing.assert_array_equal(same.t, finer.mesh.t)
         body, ancestors = finer, ancestors[parents]
     check_parents(first.mesh, body.mesh, ancestors)
-
-
-def test_nothing_is_halved_where_nothing_is_chosen():
-    body = box_mesh()
-    finer, parents = body.halved(np.array([], dtype=int))
-    np.testing.assert_array_equal(finer.mesh.t, body.mesh.t)
-    np.testing.assert_array_equal(parents, np.arange(body.mesh.nelements))
 
 
 @pytest.fixture(scope="module")
@@ -110,15 +103,11 @@ def test_a_finer_mesh_is_nested_in_the_coarser_one(family):
     """The flat elements are; the coarser ones' vertices come first, and those inside do not move."""
     for (coarse, _), (fine, parents) in pairwise(family):
         check_parents(coarse.body.mesh, fine.body.mesh, parents)
+        assert 1.95 < fine.mesh.nelements / coarse.mesh.nelements < 2.25
         count = coarse.mesh.nvertices
         np.testing.assert_array_equal(fine.body.mesh.p[:, :count], coarse.body.mesh.p)
         np.testing.assert_allclose(fine.points[:count], coarse.points[:count], rtol=0, atol=1e-9 * RADIUS)
         np.testing.assert_array_equal(nodes(fine.mesh)[: fine.mesh.nvertices], fine.points[: fine.mesh.nvertices])
-
-
-def test_a_finer_mesh_has_about_twice_as_many_elements(family):
-    for (coarse, _), (fine, _) in pairwise(family):
-        assert 1.95 < fine.mesh.nelements / coarse.mesh.nelements < 2.25
 
 
 def test_the_boundary_is_on_the_true_surface_and_outlines_on_the_true_outline(family):
@@ -137,10 +126,8 @@ def test_the_boundary_is_on_the_true_surface_and_outlines_on_the_true_outline(fa
 def facet_areas(mesh, chosen):
     """Area along z of the six-node facets whose nodes are all chosen, four flat triangles to each [m²]."""
     table = facet_nodes(mesh)
-    x = nodes(mesh)[table[np.isin(table, chosen).all(axis=1)]]
-    parts = [(0, 3, 5), (3, 1, 4), (5, 4, 2), (3, 4, 5)]
-    a, b, c = (np.concatenate([x[:, p[k]] for p in parts]) for k in range(3))
-    return abs(np.cross(b - a, c - a)[:, 2].sum()) / 2
+    flat = table[np.isin(table, chosen).all(axis=1)][:, PARTS_OF_FACET].reshape(-1, 3)
+    return abs(triangle_normals(nodes(mesh), flat)[:, 2].sum()) / 2
 
 
 def test_held_caps_keep_their_area_and_come_closer_to_the_disc(family):
@@ -151,11 +138,7 @@ def test_held_caps_keep_their_area_and_come_closer_to_the_disc(family):
     below, above = np.array(missing).T
     assert (np.diff(above) < 0).all() and above[-1] < 0.2 * above[0]
     assert below[-1] > 0.5 * below[0], "nothing is refined there"
-
-
-def test_the_volume_approaches_that_of_the_ball(family):
-    ball = 4 / 3 * np.pi * RADIUS**3
-    off = [abs(build_elements(mesh.mesh, 4).weights.sum() / ball - 1) for mesh, _ in family]
+    off = [abs(build_elements(mesh.mesh, 4).weights.sum() / (4 / 3 * np.pi * RADIUS**3) - 1) for mesh, _ in family]
     assert max(off) < 2e-3 and off[-1] < off[0]
 
 
@@ -190,14 +173,6 @@ def test_meshes_are_upright_and_their_middles_are_drawn_to_outlines(family):
         assert np.median(way) == pytest.approx(SHARE, abs=0.01)
 
 
-def test_the_same_marks_give_the_same_bits(base, family):
-    again, parents = base.finer(beside_top_outline(base), 2 * base.mesh.nelements)
-    fine, fine_parents = family[1]
-    np.testing.assert_array_equal(again.points, fine.points)
-    np.testing.assert_array_equal(again.mesh.t, fine.mesh.t)
-    np.testing.assert_array_equal(parents, fine_parents)
-
-
 def test_the_last_bits_of_an_indicator_change_no_mark(base):
     """Processors round differently: elements with equal indicators are marked in the order of their numbers."""
     ranks = np.argsort(np.argsort(beside_top_outline(base)))
@@ -208,13 +183,6 @@ def test_the_last_bits_of_an_indicator_change_no_mark(base):
     even, _ = marked(base.body, np.ones(len(indicator)), base.mesh.nelements + 1)
     first, _ = base.body.halved(np.array([0]))
     np.testing.assert_array_equal(even.mesh.t, first.mesh.t)
-
-
-def test_each_node_belongs_to_an_element_that_has_it(family):
-    mesh = family[2][0].body.mesh
-    cells = element_nodes(mesh)
-    owner = at_nodes(mesh, np.arange(mesh.nelements))
-    assert (cells[owner] == np.arange(len(owner))[:, None]).any(axis=1).all()
 
 
 def test_an_element_that_would_fold_keeps_the_nodes_that_are_safe():
@@ -244,12 +212,6 @@ def test_a_body_that_comes_as_a_mesh_keeps_its_flat_sides(tmp_path):
     check_parents(body.mesh, fine.body.mesh, parents)
     np.testing.assert_allclose(fine.points, nodes(fine.body.mesh), rtol=0, atol=1e-15)
     assert fine.off == 0 and fine.lumen_at(0.0) is None
-
-
-def test_nothing_is_marked_where_nothing_is_indicated():
-    body = base_mesh(BALL_CLAMPED, 80, 0).body
-    finer, parents = marked(body, np.zeros(body.mesh.nelements), 2 * body.mesh.nelements)
-    assert finer is body and np.array_equal(parents, np.arange(body.mesh.nelements))
 
 
 def test_the_faces_of_a_cut_stay_in_its_plane_where_the_surface_leans_over_it():
@@ -288,10 +250,3 @@ def test_the_coarsest_mesh_keeps_the_area_that_is_held_and_no_part_of_it_folds()
     halved = mesh.finer(np.ones(mesh.mesh.nelements), 2 * mesh.mesh.nelements)[0]
     check_neighbours(halved.mesh)  # refuses an element that folds
     assert halved.lost_area < LOST
-
-
-@pytest.mark.campaign
-def test_a_region_that_no_mesh_keeps_has_no_reference(monkeypatch):
-    monkeypatch.setattr(NestedMesh, "lost_area", 4.2)
-    with pytest.raises(StudyError, match=r"from 80 to 160 surface nodes .* at least 4.2 % off .*allowed: 3 %.*base"):
-        base_mesh(BALL_CLAMPED, 80, 0)

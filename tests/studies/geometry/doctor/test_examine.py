@@ -12,7 +12,7 @@ from massspring import Material, step_limit, tetrahedral_body
 from studies.base.errors import StudyError
 from studies.geometry.doctor.examine import examine
 from studies.geometry.doctor.findings import RULES
-from studies.geometry.surface.edit import split_edge
+from studies.geometry.surface.node_count import split_edge
 from tests.studies.geometry.boxes import box, split, together
 from tests.studies.geometry.real import COARSE, real_surface
 

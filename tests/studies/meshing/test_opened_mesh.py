@@ -1,15 +1,19 @@
-"""A cut that advances over a mesh: the body is valid at each stage, and all of the cut is open at the end."""
+"""Opened meshes: valid at each stage of a cut that advances; plane strain along a slit does not depend on the slit."""
 
 import itertools
 
 import numpy as np
 import pytest
 from scipy.spatial import Delaunay
+from skfem import MeshTet, MeshTet2
 
 from massspring import MassSpringError
 from massspring.body.opening import opened
+from reference_fem import NeoHookean, PrescribedDisplacement, Problem, equilibrium_path, nodes
+from studies.base.errors import StudyError
+from studies.geometry.mesh.organ_mesh import counted_edges, turn_inverted
 from studies.meshing import opened_mesh
-from studies.meshing.opened_mesh import faces_in_stages
+from studies.meshing.opened_mesh import faces_in_stages, opened_elements
 from tests.massspring.conftest import block, boundary
 from tests.massspring.cuts import layer_faces
 
@@ -53,8 +57,7 @@ def wrong(cells: np.ndarray, faces: np.ndarray, n: int) -> str | None:
         triangles = boundary(opened(cells, faces, n).cells.astype(np.int64)) if len(faces) else boundary(cells)
     except MassSpringError as error:
         return str(error)
-    ends = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-    if (np.unique(ends, axis=0, return_counts=True)[1] != 2).any():
+    if (counted_edges(triangles)[1] != 2).any():
         return "an edge has more than two triangles"
     return "a node has two fans" if max(fans(triangles).values()) > 1 else None
 
@@ -71,16 +74,14 @@ def disc(seed: int, inner: bool = False, count: int = 60) -> tuple[np.ndarray, n
     half = layer.reshape(3, 4, -1).transpose(0, 2, 1).reshape(-1, 4)
     cells = np.concatenate([half, half + count])
     points = np.concatenate([np.column_stack([flat, np.full(count, z)]) for z in (-0.1, 0.0, 0.1)])
-    a, b, c, d = points[cells].transpose(1, 0, 2)
-    negative = np.einsum("ij,ij->i", np.cross(b - a, c - a), d - a) < 0
-    cells[negative] = cells[negative][:, [0, 2, 1, 3]]
+    cells = turn_inverted(points, cells)
     assert (np.linalg.det(np.diff(flat[triangles], axis=1)) > 0).all()  # seen from in front
     if inner:
         triangles = triangles[(np.linalg.norm(flat[triangles], axis=2) < 0.5).any(axis=1)]
     return cells, triangles + count, points @ [*random.standard_normal(2), 0.0]
 
 
-DIRECTIONS = [(0, 0, -1), (0, 0, 1), (0, 1, 0), (0, -1, -1), (0, 3, -1), (1, 0, -4)]
+DIRECTIONS = [(0, 0, -1), (0, 1, 0), (0, 3, -1), (1, 0, -4)]
 
 
 @pytest.mark.parametrize("reach", [3, np.inf])
@@ -127,11 +128,48 @@ def test_without_waiting_some_surfaces_would_meet_themselves(monkeypatch):
     assert {"an edge has more than two triangles", "a node has two fans"} <= faults
 
 
-def test_a_front_passes_several_nodes_at_once_or_none():
-    """Rows of equal height: shares between two rows open nothing."""
-    points, _, cells = block(CELLS, distortion=0.0)
-    faces, n = layer_faces(cells, CELLS, CELLS[0] // 2), len(points)
-    shares = np.linspace(0.0, 1.0, 2 * CELLS[2] + 1)
-    stages = faces_in_stages(faces, parting_nodes(cells, faces, n), points @ [0.0, 0.0, 1.0], shares)
-    counts = [int(stage.sum()) for stage in stages]
-    assert counts[1:-1:2] == counts[:-2:2] and np.all(np.diff(counts[:-2:2]) == 2 * CELLS[1])
+FEW, HEIGHT, EDGE = (2, 3, 3), 2, 0.02
+STRAIN = np.diag([1.0, 1.1, 1.0 / 1.1]) - np.eye(3)
+MATERIAL = NeoHookean(1800.0, 1e4 * 1800.0)
+
+
+def opened_block() -> tuple[MeshTet2, np.ndarray]:
+    """A block cut flat between its layers up to a front inside, and the parent of each node."""
+    points, _, tetrahedra = block(FEW, EDGE)
+    at = np.unravel_index(np.arange(len(points)), np.add(FEW, 1))[0]
+    points[at == FEW[0] // 2, 0] = EDGE * (FEW[0] // 2)
+    flat = MeshTet(np.ascontiguousarray(points.T), np.ascontiguousarray(tetrahedra.T))
+    return opened_elements(MeshTet2.from_mesh(flat), layer_faces(tetrahedra, FEW, FEW[0] // 2, HEIGHT))
+
+
+def test_plane_strain_along_a_slit_keeps_it_shut():
+    """But for what a finite bulk modulus leaves: the law's deviator pulls at the sides, mu/kappa of it is seen."""
+    mesh, parent = opened_block()
+    x = nodes(mesh)
+    slit = np.bincount(parent)[parent] == 2
+    inside = slit & (x[:, 1] > 0.005) & (x[:, 1] < 0.055) & (x[:, 2] > 0.005)
+    assert inside.sum() >= 4
+    places = {tuple(place) for place in np.round(x[inside], 9)}
+
+    def outside(at: np.ndarray) -> np.ndarray:
+        return np.array([tuple(place) not in places for place in np.round(at.T, 9)])
+
+    held = PrescribedDisplacement(outside, motion=lambda t: (t, t, t), shape=lambda at: STRAIN @ at)
+    (state,) = equilibrium_path(Problem(mesh, MATERIAL, (held,)), [1.0])
+    np.testing.assert_allclose(state.u[inside], x[inside] @ STRAIN, atol=1e-4 * np.ptp(x))
+    # What is held apart from its slit moves otherwise: the copies are free of each other.
+    pulled = PrescribedDisplacement(
+        lambda at: outside(at) & (np.abs(at[0] - EDGE) > 0.5 * EDGE),
+        motion=lambda t: (t, t, t),
+        shape=lambda at: np.stack([0.1 * at[0], 0 * at[1], 0 * at[2]]),
+    )
+    (state,) = equilibrium_path(Problem(mesh, MATERIAL, (pulled,)), [1.0])
+    pairs = np.flatnonzero(slit)[np.argsort(parent[slit], kind="stable")].reshape(-1, 2)
+    assert np.abs(np.diff(state.u[pairs, 0], axis=1)).max() > 0.02 * EDGE
+
+
+def test_faces_that_are_not_between_elements_are_refused():
+    points, triangles, tetrahedra = block(FEW, EDGE)
+    flat = MeshTet(np.ascontiguousarray(points.T), np.ascontiguousarray(tetrahedra.T))
+    with pytest.raises(StudyError, match="is not opened by the cut"):
+        opened_elements(MeshTet2.from_mesh(flat), triangles[:1])

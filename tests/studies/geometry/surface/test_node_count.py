@@ -8,9 +8,8 @@ from studies.geometry import ball, check_surface
 from studies.geometry.mesh.organ_mesh import triangle_areas, unique_edges
 from studies.geometry.organs import SHAPES
 from studies.geometry.shape.levelset import Shape, project
-from studies.geometry.surface.edit import collapse_edge, flip_edges, split_edge, with_node_count
 from studies.geometry.surface.first_surface import first_surface
-from studies.geometry.surface.node_count import surface_with
+from studies.geometry.surface.node_count import collapse_edge, flip_edges, split_edge, surface_with, with_node_count
 
 BALL = SHAPES["ball"](0.05)
 
