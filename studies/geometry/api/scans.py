@@ -164,10 +164,8 @@ def level_arrays(recipe: Mapping[str, Any], surface: RepairedSurface) -> dict[st
 
 
 def repaired_surface(source: Source, content: Content, remeshing: Remeshing) -> tuple[RepairedSurface, dict[str, Any]]:
-    """The surface of a file [m], welded and (without `solid`) repaired, and the recipe of the file.
-
-    Warns of every change. Raises StudyError for a surface that cannot be repaired or has the size of no organ.
-    """
+    """The surface of a file [m], welded and (without `solid`) repaired, and the recipe of the file. Warns of every
+    change. Raises StudyError for a surface that cannot be repaired or has the size of no organ."""
     path = source.path
     welded = weld(*in_metres(source, content))
     # `solid` needs all parts of the surface, which may be open.

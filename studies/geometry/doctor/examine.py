@@ -46,9 +46,9 @@ def examine(
 ) -> Findings:
     """The measures and faults of a mesh file or an OrganMesh.
 
-    source: a Source may also have a scale or a part. unit: of the file, one of UNITS; None: the one that the file
-    states, else the most likely one, which is a finding unless only metres are likely. tissue: shear modulus [Pa] and
-    density [kg/m^3] for the time step. Raises StudyError for a file without a mesh or with an impossible size.
+    unit: of the file, one of UNITS; None: the one that it states, else the most likely one, which is a finding unless
+    only metres are likely. tissue: shear modulus [Pa] and density [kg/m^3] for the time step. Raises StudyError for a
+    file without a mesh or with an impossible size.
     """
     if isinstance(source, OrganMesh):
         cells = source.tetrahedra if len(source.tetrahedra) else source.triangles
@@ -87,10 +87,8 @@ def unit_of(source: Source, content: Content) -> tuple[dict[str, Any], float]:
 def examine_cells(
     name: str, points: np.ndarray, cells: np.ndarray, file_measures: dict[str, Any], tissue: tuple[float, float]
 ) -> Findings:
-    """Measures and faults of points (n, 3) [m] and triangles (t, 3) or tetrahedra (k, 4).
-
-    file_measures: measures of the file, which are added. Of points that are not finite nothing else is measured.
-    """
+    """Measures and faults of points (n, 3) [m] and triangles (t, 3) or tetrahedra (k, 4), with those of the file; of
+    points that are not finite nothing else is measured."""
     solid = cells.shape[1] == 4
     measures: dict[str, Any] = {"kind": "tetrahedra" if solid else "surface", "part_list": [], **file_measures}
     measures = {"bad_points": int((~np.isfinite(points).all(axis=1)).sum())} | measures

@@ -47,10 +47,8 @@ class Content:
 
     @property
     def longest_side(self) -> float:
-        """Longest side of the box around the finite points of the cells, in the unit of the file; 0 without points.
-
-        If a cell uses a point that does not exist, all finite points count.
-        """
+        """Longest side of the box around the finite points of the cells (all, if a cell uses a point that does not
+        exist), in the unit of the file; 0 without points."""
         used = self.points[np.unique(self.cells)] if self.has_all_points else self.points
         finite = used[np.isfinite(used).all(axis=1)]
         # Halved before the difference, which could overflow.

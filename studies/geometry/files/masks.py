@@ -59,10 +59,8 @@ def is_mask(path: Path) -> bool:
 
 def read_mask(path: Path, part: str | None) -> tuple[Content, str | None]:
     """The surface of the label `part` (number or name; None: the only one), and a remark if the image cuts it off.
-
-    Raises StudyError for an image that is no mask, for a label that it does not contain, for several labels without a
-    `part`, and if the package that reads the image is not installed.
-    """
+    Raises StudyError for an image that is no mask, for an unknown label or several without a `part`, and if the package
+    that reads it is not installed."""
     mask = load_nrrd(path) if path.name.lower().endswith(NRRD) else load_nifti(path)
     label = chosen_label(mask, part, path.name)
     points, triangles, cut = label_surface(mask, label)

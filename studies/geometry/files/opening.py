@@ -23,9 +23,8 @@ OBJECTS = (".off", ".obj", ".glb", ".gltf")
 def opened(source: Source) -> Content:
     """The content of a file, or of the part of it that `source` names, in the unit of the file.
 
-    meshio reads STL, PLY, VTK, VTU, MSH and more, trimesh OFF, OBJ and glTF; VTP, surfaces in legacy VTK, and label
-    masks in NIfTI and NRRD are read too. Warns of an assumed unit and of a label that the image cuts off. Raises
-    StudyError for a file that cannot be read, or that lacks cells or the part.
+    meshio reads STL, PLY, VTK, VTU, MSH and more, trimesh OFF, OBJ and glTF. Warns of an assumed unit and of a label
+    that the image cuts off. Raises StudyError for a file that cannot be read, or that lacks cells or the part.
     """
     path = source.path
     if not path.is_file():
@@ -73,10 +72,8 @@ def read(path: Path, part: str | None) -> tuple[Content, str | None]:
 
 
 def content_of(raw: meshio.Mesh, name: str) -> Content:
-    """Tetrahedra and triangles of a mesh, with polygons cut into triangles; points and lines are left out.
-
-    Raises StudyError for cells of other kinds.
-    """
+    """Tetrahedra and triangles of a mesh, with polygons cut into triangles; points and lines are left out. Raises
+    StudyError for cells of other kinds."""
     tetrahedra, triangles = [np.empty((0, 4), np.int64)], [np.empty((0, 3), np.int64)]
     for block in raw.cells:
         if block.type in ("vertex", "line"):

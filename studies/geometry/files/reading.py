@@ -20,11 +20,10 @@ PATCH = "patch_"
 def read_mesh(path: str | Path | Source, unit: str | None = None, flip: bool = False) -> OrganMesh:
     """A closed surface or a tetrahedral body from any file that `opened` reads (STL, PLY, OBJ, VTK, glTF, masks, ...).
 
-    path: a file, or a Source, which also has a scale or a part. unit: of the coordinates, one of UNITS; None: the one
-    that the file states, or metres. flip: whether an inverted surface or inverted tetrahedra are flipped instead of
-    refused. Coincident points are merged and unused points are left out; if a body has tetrahedra, its triangles are
-    left out too. Warns if the size does not fit the unit. Raises StudyError for a file that cannot be read or whose
-    mesh is not usable.
+    path: a file, or a Source. unit: of the coordinates, one of UNITS; None: the one that the file states, or metres.
+    flip: whether an inverted surface or inverted tetrahedra are flipped instead of refused. Coincident points are
+    merged, unused ones left out, and of a body with tetrahedra its triangles too. Warns if the size does not fit the
+    unit. Raises StudyError for a file that cannot be read or whose mesh is not usable.
     """
     source = as_source(path, unit)
     name = source.path.name
@@ -49,10 +48,8 @@ def read_mesh(path: str | Path | Source, unit: str | None = None, flip: bool = F
 
 
 def with_patches(mesh: OrganMesh, content: Content, metres: float) -> OrganMesh:
-    """The mesh with the attachments of the file: point data `patch_NAME` that are above 0 at its outer nodes.
-
-    metres: per unit of the file.
-    """
+    """The mesh with the attachments of the file: point data `patch_NAME` above 0 at its outer nodes; metres: per unit
+    of the file."""
     marked = marked_nodes(content)
     if not marked:
         return mesh
@@ -80,10 +77,8 @@ def weld(points: np.ndarray, cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]
 
 
 def tetrahedral(points: np.ndarray, tetrahedra: np.ndarray, flip: bool, recipe: dict) -> OrganMesh:
-    """A checked body with its boundary, whose nodes come first; flip: whether inverted tetrahedra are flipped.
-
-    Raises StudyError for tetrahedra that form no usable body.
-    """
+    """A checked body with its boundary, whose nodes come first; flip: whether inverted tetrahedra are flipped. Raises
+    StudyError for tetrahedra that form no usable body."""
     if flip:
         tetrahedra = turn_inverted(points, tetrahedra)
     check_tetrahedra(points, tetrahedra, recipe["file"])

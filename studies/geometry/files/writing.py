@@ -97,11 +97,8 @@ def content(mesh: meshio.Mesh, suffix: str) -> bytes:
 
 
 def write_grid_file(path: Path, points: np.ndarray, cells: dict[str, np.ndarray], data: dict[str, np.ndarray]) -> None:
-    """Writes a grid to a file, whole or not at all. Raises StudyError if it cannot be written.
-
-    points: (n, 3) [m]; cells: type as meshio names it ("triangle", "tetra", "tetra10") -> nodes (k, m); data: name ->
-    point data.
-    """
+    """Writes a grid to a file, whole or not at all. points: (n, 3) [m]; cells: type as meshio names it ("triangle",
+    "tetra10") -> nodes (k, m); data: name -> point data. Raises StudyError if it cannot be written."""
     blocks: list[Any] = [(kind, nodes.astype(np.int32)) for kind, nodes in cells.items()]
     write_whole(path, content(meshio.Mesh(points, blocks, dict(data)), path.suffix.lower()))
 

@@ -139,11 +139,9 @@ def fill_once(
 
 
 def fill_surface(points: np.ndarray, triangles: np.ndarray, strict: bool = True) -> tuple[np.ndarray, np.ndarray]:
-    """Fills a closed surface: all points (n, 3) [m], those of the surface first, and tetrahedra (k, 4).
-
-    It tries several algorithms in a fixed order until the worst element is good enough, and takes the best fill. Raises
-    StudyError if all fail, and, if `strict`, for an element worse than MIN_DIHEDRAL or MIN_RATIO.
-    """
+    """Fills a closed surface: all points (n, 3) [m], those of the surface first, and tetrahedra (k, 4): the best fill
+    of several algorithms, tried until the worst element is good enough. Raises StudyError if all fail, and, if
+    `strict`, for an element worse than MIN_DIHEDRAL or MIN_RATIO."""
     attempts, enough = (FEW_ATTEMPTS, 1.5) if len(points) <= MANY else (MANY_ATTEMPTS, 1.25)
     best: tuple[float, np.ndarray, np.ndarray] | None = None
     failures: list[str] = []
@@ -177,11 +175,9 @@ def fill_score(points: np.ndarray, tetrahedra: np.ndarray) -> float:
 
 
 def build_octant(recipe: dict[str, Any], arrays: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Octant x, y, z >= 0 of the ball of `radius` [m]: the arrays of jobs.PARTS.
-
-    The element size grows from `h_pole` [m] at (0, 0, radius) to `h` [m] at a distance of one radius. Nodes of the
-    planes of symmetry have exactly coordinate 0, and nodes of the sphere the distance `radius` up to rounding.
-    """
+    """Octant x, y, z >= 0 of the ball of `radius` [m]: the arrays of jobs.PARTS. The element size grows from `h_pole`
+    [m] at (0, 0, radius) to `h` [m] at a distance of one radius. Nodes of the planes of symmetry have exactly
+    coordinate 0."""
     radius, h, h_pole = recipe["radius"], recipe["h"], recipe["h_pole"]
     with fresh_model(Mesh_Algorithm3D=1, Mesh_Optimize=1, Mesh_OptimizeNetgen=1, Mesh_MeshSizeExtendFromBoundary=0):
         # Unit radius inside gmsh: its geometric tolerances are absolute.

@@ -48,9 +48,9 @@ class EvenRemesher:
 def organ_surface(shape: Shape, nodes: int, regions: list[Region], sides: str | None) -> Surface:
     """A surface with `nodes` nodes and the outline of every region on its edges.
 
-    sides: None: the nodes are evenly spread; "straight" or "curved", for quadratic sides with mid-side nodes on f = 0:
-    the nodes are even if that is near enough to the shape, else it is the nearest surface of those with spare nodes.
-    Raises StudyError if none is well shaped, or an outline does not fit.
+    sides: None: evenly spread nodes; "straight" or "curved" (quadratic, with mid-side nodes on f = 0): even if that is
+    near enough to the shape, else the nearest of those with spare nodes. Raises StudyError if none is well shaped, or
+    an outline does not fit.
     """
     truth = first_surface(shape)
     with fresh_model():

@@ -41,9 +41,9 @@ def build(recipe: dict[str, Any], arrays: Arrays) -> Arrays:
 def build_scan(recipe: dict[str, Any], arrays: Arrays) -> Arrays:
     """A mesh of the shape that a given surface approximates, with `nodes` surface nodes and the outlines of regions.
 
-    The mesh has the volume of the surface, and `losses` are its deviations from the file. If the arrays contain the
-    grid of the true shape, the nodes lie on that shape instead, for sides that will be curved onto it, and the losses
-    are those of the shape.
+    It has the volume of the surface, and `losses` are its deviations from the file. If the arrays contain the grid of
+    the true shape, the nodes lie on that shape instead, for sides that will be curved onto it, and the losses are the
+    shape's.
     """
     file = arrays["points"], arrays["triangles"]
     regions = [region_from_dict(data) for data in recipe["regions"].values()]
@@ -74,7 +74,6 @@ def lost(file: Surface, body: Surface, made: Surface) -> np.ndarray:
 
 
 def build_level(recipe: dict[str, Any], arrays: Arrays) -> Arrays:
-    """The grid of the true shape of a scan, the same for all its meshes, and its losses: the arrays of jobs.LEVEL."""
     file = arrays["points"], arrays["triangles"]
     body = solid_body(recipe, file)
     grid = true_grid(*smooth_body(recipe, body, COARSEST * box_of(*body)[0]), recipe["name"])
@@ -83,7 +82,6 @@ def build_level(recipe: dict[str, Any], arrays: Arrays) -> Arrays:
 
 
 def solid_body(recipe: dict[str, Any], file: Surface) -> Surface:
-    """The surface of a file, or with "solid" in the recipe that of the body that it encloses."""
     stage("distances to the surface of the file")
     return file if recipe.get("solid") is None else solidified(*file, recipe["solid"], recipe["name"])
 
@@ -102,11 +100,9 @@ SPARE = 0.1
 
 
 def scan_mesh(shape: Shape, start: Surface, nodes: int, regions: list[Region], curved: bool) -> Surface:
-    """A surface of `nodes` nodes on f = 0 that follows its shape, with the outline of every region on its edges.
-
-    start: a fine triangulation of the shape; curved: the sides will be quadratic, with mid-side nodes on f = 0. Raises
-    StudyError if none is well shaped.
-    """
+    """A surface of `nodes` nodes on f = 0 that follows its shape, with the outline of every region on its edges. start:
+    a fine triangulation of the shape; curved: the sides will be quadratic, with mid-side nodes on f = 0. Raises
+    StudyError if none is well shaped."""
     area, handles = float(triangle_areas(*start).sum()), handles_of(*start)
     best: Fit | None = None
     refusals = []

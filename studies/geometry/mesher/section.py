@@ -212,11 +212,10 @@ def _pieces(triangles: np.ndarray, count: int) -> list[np.ndarray]:
 def section(
     plane: HalfSpace, points: np.ndarray, edges: np.ndarray, within: Region | None, name: str
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Meshes the section of a plane, whose trace is `edges` (e, 2).
+    """Meshes the section of a plane, whose trace is `edges` (e, 2): new points (n, 3) [m] in the plane, triangles (t,
+    3) of all points, old ones first, anticlockwise seen from in front, and which of them belong to the blade (t,).
 
-    Returns new points (n, 3) [m] in the plane, triangles (t, 3) of all points, old ones first, anticlockwise seen from
-    in front, and which of them belong to the blade (t,). Raises StudyError for a section or blade without faces, and
-    for a front or disc that does not fit.
+    Raises StudyError for a section or blade without faces, and for a front or disc that does not fit.
     """
     if not len(edges):
         raise StudyError(f"{name}: no edge of the surface lies in its plane, so small is what it cuts; use more nodes")
@@ -280,11 +279,9 @@ def _rim(plane: HalfSpace, within: BallRegion, normal: np.ndarray, axes: np.ndar
 
 
 def meshed(flat: np.ndarray, outlines: list[np.ndarray], chain: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Meshes a plane region: points (m, 2), the given points `flat` first, and triangles (t, 3), anticlockwise.
-
-    outlines: loops of point numbers that bound the region; chain (c,): point numbers whose connections become edges,
-    from outline to outline, or a ring whose first point is also its last.
-    """
+    """Meshes a plane region: points (m, 2), the given `flat` first, and triangles (t, 3), anticlockwise. outlines:
+    loops of point numbers that bound the region; chain (c,): point numbers whose connections become edges, from outline
+    to outline, or a ring whose first point is also its last."""
     size, add = float(np.ptp(flat)), gmsh.model.geo
     closed = len(chain) > 0 and chain[0] == chain[-1]
     with fresh_model(Mesh_Algorithm=6):

@@ -48,9 +48,9 @@ def make_shape(name: str, parameters: Mapping[str, Any]) -> Shape:
 def vary(name: str, seed: int, spread: float = 0.2) -> dict[str, float]:
     """Random parameters of a plausible organ, each within 1 - spread to 1 + spread times its default; JSON-able.
 
-    All lengths share one random factor, and each has a smaller one that is independent. The wall varies independently
-    of them, because filling thins it. The same seed gives the same organ. Raises StudyError for an unknown organ, a
-    seed that is not a whole number >= 0, and a spread outside 0 to WIDEST.
+    All lengths share one random factor, and each has a smaller one of its own. The wall varies independently, because
+    filling thins it. The same seed gives the same organ. Raises StudyError for an unknown organ, a seed that is not a
+    whole number >= 0, and a spread outside 0 to WIDEST.
     """
     shape = lookup(name, SHAPES, "organ")
     if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:

@@ -13,11 +13,9 @@ BAND = 4.0
 
 
 def distance_grid(points: np.ndarray, triangles: np.ndarray, cell: float, margin: float) -> DistanceGrid:
-    """Signed distance [m], negative inside, to a surface of points (n, 3) [m] and triangles (t, 3).
-
-    cell: edge of the grid cells [m]; margin: room around the surface [m]. A point lies inside if its winding number is
-    positive, so parts that overlap or cross themselves count once. The triangles must be outward and without border.
-    """
+    """Signed distance [m], negative inside, to a surface of points (n, 3) [m] and outward triangles (t, 3) without
+    border, on cells of edge `cell` [m] with `margin` [m] around it. A point lies inside if its winding number is
+    positive, so parts that overlap or cross themselves count once."""
     used = points[np.unique(triangles)]
     low, high = used.min(axis=0) - margin, used.max(axis=0) + margin
     shape = np.ceil((high - low) / cell).astype(int) + 1
@@ -43,8 +41,8 @@ def winding_number(points: np.ndarray, triangles: np.ndarray, axes: list[np.ndar
     """Winding number of the surface around each grid point, shape (a, b, c): signed crossings of the ray upwards.
 
     axes: coordinates [m] of the grid along x, y, z. Rays are moved off the grid by a tiny irrational fraction of a
-    cell, so that none meets an edge. Each edge is evaluated from its lower to its higher node, so that its two
-    triangles agree about every ray.
+    cell, so that none meets an edge. Each edge is evaluated from its lower to its higher node, so its two triangles
+    agree.
     """
     x, y, z = axes
     shift = 1e-7 * (x[1] - x[0]) * np.array([np.sqrt(2.0), np.sqrt(3.0)])

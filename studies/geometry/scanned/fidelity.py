@@ -16,12 +16,9 @@ of a relative change of the volume beyond this share."""
 
 
 def fidelity(file: Surface, mesh: Surface) -> dict[str, Any]:
-    """Deviations of a mesh from the surface of a file, each as points (n, 3) [m] and closed triangles (t, 3).
-
-    Returns a JSON-able dict. file_to_mesh, mesh_to_file: mean, p95 and max of the distance [m], and where the largest
-    is [m]; volume_file, volume_mesh [m^3]; diagonal: of the box of the file [m]; edge: mean edge of the mesh [m];
-    handles: number of handles of the mesh.
-    """
+    """Deviations of a mesh from the surface of a file, JSON-able: file_to_mesh, mesh_to_file: mean, p95 and max of the
+    distance [m], and where the largest is [m]; volume_file, volume_mesh [m^3]; diagonal: of the box of the file [m];
+    edge: mean edge of the mesh [m]; handles: of the mesh."""
     return {
         "file_to_mesh": spread(file, mesh),
         "mesh_to_file": spread(mesh, file),
@@ -34,10 +31,8 @@ def fidelity(file: Surface, mesh: Surface) -> dict[str, Any]:
 
 
 def spread(one: Surface, other: Surface) -> dict[str, Any]:
-    """Mean, p95 and max [m] of the distance of `one` surface from the `other`, and the point [m] of the largest.
-
-    Measured at the nodes, edge midpoints and centroids of `one`; mean and 95th percentile are weighted by area.
-    """
+    """Mean, p95 and max [m] of the distance of `one` surface from the `other`, and the point [m] of the largest, at the
+    nodes, edge midpoints and centroids of `one`; mean and 95th percentile are weighted by area."""
     places, weights = samples(*one)
     away = distance_to_surface(places, *other)
     order = np.argsort(away)

@@ -48,8 +48,8 @@ def levelled(points: np.ndarray, triangles: np.ndarray, cell: float, smooth: flo
     """The surface without details finer than the length `smooth` [m].
 
     Folds narrower than twice `smooth` are closed by Serra's morphological closing: the surface moves out by `smooth`
-    and back in. Then a Gaussian of half that length on the signed distance levels bumps, and the volume after closing
-    is kept. cell: largest cell edge [m]. Raises StudyError if nothing of the shape is left.
+    and back in. Then a Gaussian of half that length levels bumps, and the volume after closing is kept. cell: largest
+    cell edge [m]. Raises StudyError if nothing of the shape is left.
     """
     diagonal, _ = box_of(points, triangles)
     if smooth >= 0.25 * diagonal:
@@ -75,12 +75,9 @@ def levelled(points: np.ndarray, triangles: np.ndarray, cell: float, smooth: flo
 def faithful(
     points: np.ndarray, triangles: np.ndarray, cell: float, name: str, allowed: float = MISSED
 ) -> tuple[DistanceGrid, Surface]:
-    """The signed distance to a surface and its first triangulation, on a grid fine enough for its thin parts.
-
-    The cells start at `cell` [m] and shrink, down to FINEST of the diagonal, as long as the surface is farther than
-    `allowed` of the diagonal from the triangulation. A finer grid with more handles is not used: the handles are holes
-    in parts that are too thin for it.
-    """
+    """The signed distance to a surface and its first triangulation, on a grid fine enough for its thin parts: cells
+    shrink from `cell` [m] to FINEST of the diagonal as long as the surface is farther than `allowed` of it from the
+    triangulation. A finer grid with more handles is not used: they are holes in parts that are too thin for it."""
     diagonal, _ = box_of(points, triangles)
     used = np.unique(triangles)
     asked = points[used[:: -(-len(used) // ASKED)]]

@@ -54,13 +54,12 @@ FLAT = 1e-6
 
 
 def canal(x: np.ndarray, spheres: Sequence[Sphere]) -> np.ndarray:
-    """Signed distance f, shape (n,), of x (n, 3) to a canal surface, the envelope of spheres: min over s of
-    |x - c(s)| - r(s), negative inside.
+    """Signed distance f, shape (n,), of x (n, 3) to a canal surface, the envelope of spheres: min over s of |x - c(s)|
+    - r(s), negative inside (Monge, Application de l'analyse a la geometrie, 1807).
 
-    (c, r)(s), 0 <= s <= 1, is the Bezier curve of the control `spheres`, so the surface does not depend on a sampling.
-    |grad f| = 1 wherever the nearest s is unique, so a wall between f = 0 and f = -w has the thickness w everywhere. An
-    end is round and infinitely smooth if the last control sphere lies well inside the one before it (`closed` adds such
-    spheres). Monge, Application de l'analyse a la geometrie, 1807.
+    (c, r)(s), 0 <= s <= 1, is the Bezier curve of the control `spheres`. |grad f| = 1 wherever the nearest s is unique,
+    so a wall between f = 0 and f = -w has the thickness w everywhere. An end is round and infinitely smooth if the last
+    control sphere lies well inside the one before it (`closed` adds such spheres).
     """
     table, x = _table(tuple(spheres)), np.asarray(x, float)
     return np.concatenate([np.empty(0), *(_nearest(x[k : k + BATCH], table) for k in range(0, len(x), BATCH))])

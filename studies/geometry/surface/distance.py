@@ -50,7 +50,7 @@ class ChangingFacets:
 
     def measure(self, places: np.ndarray, pieces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Distances [m] of the points of the fixed surface to the other one, (n,), and of `places` to the fixed
-        surface, (t, p). They equal those of SurfaceDistance bit for bit.
+        surface, (t, p), equal to those of SurfaceDistance bit for bit.
 
         places: p points on each of t facets of the other surface, (t, p, 3) [m]; pieces: flat triangles between the
         points of one facet, (k, 3).

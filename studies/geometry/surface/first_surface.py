@@ -54,11 +54,9 @@ def true_volume(shape: Shape, refinements: int = 2) -> float:
 
 
 def enclosed_volume(shape: Shape, refinements: int) -> float:
-    """Volume [m^3] inside f = 0. Raises StudyError if the surface is not inside its box.
-
-    The triangles of a fine triangulation are quartered `refinements` times, with nodes on the true surface. The volume
-    is a series in the squared edge length, which Romberg's scheme extrapolates.
-    """
+    """Volume [m^3] inside f = 0: triangles of a fine triangulation are quartered `refinements` times, with nodes on the
+    true surface; Romberg's scheme extrapolates the volume, a series in the squared edge. Raises StudyError if the
+    surface is not inside its box."""
     points, triangles = first_surface(shape)
     row = [signed_volume(points, triangles)]
     for _ in range(refinements):

@@ -24,9 +24,8 @@ def surface_with(
 ) -> Surface:
     """A good closed surface on f = 0 with exactly `nodes` nodes, or within TOLERANCE or 5 if single edits fail.
 
-    area: of the true surface [m^2]; mesh_at: edge length [m] -> points (n, 3) [m] and triangles (t, 3); handles: number
-    that the surface has to have; a ring has one. Raises StudyError for `nodes` outside FEWEST to MOST, and if no try is
-    one outward sheet without slivers.
+    area: of the true surface [m^2]; mesh_at: edge length [m] -> surface; handles: number that it has to have. Raises
+    StudyError for `nodes` outside FEWEST to MOST, and if no try is one outward sheet without slivers.
     """
     if not FEWEST <= nodes <= MOST:
         raise StudyError(f"{shape.name}: {nodes} surface nodes asked for, but the mesher offers {FEWEST} to {MOST}")
@@ -53,7 +52,6 @@ def surface_with(
 
 
 def is_good(points: np.ndarray, triangles: np.ndarray, handles: int = 0) -> bool:
-    """Whether a closed surface is outward and has so many handles and no slivers."""
     if handles_of(points, triangles) != handles or signed_volume(points, triangles) <= 0:
         return False
     return bool(triangle_radius_ratio(points, triangles).min() > QUALITY)

@@ -16,11 +16,9 @@ side."""
 
 
 def painted_region(points: np.ndarray, triangles: np.ndarray, inside: np.ndarray, name: str) -> PaintedRegion:
-    """The region of the nodes `inside` (n,) bool of a surface of points (n, 3) [m] and triangles (t, 3).
-
-    The border runs half way between nodes inside and outside. Samples are rounded to 1 µm. name: for the message.
-    Raises StudyError if all nodes are inside, or all outside.
-    """
+    """The region of the nodes `inside` (n,) bool of a surface of points (n, 3) [m] and triangles (t, 3), with its
+    border half way between nodes inside and outside. Samples are rounded to 1 µm. name: for the message. Raises
+    StudyError if all nodes are inside, or all outside."""
     used = np.unique(triangles)
     if len(np.unique(inside[used])) != 2:
         what = "the whole surface" if inside[used].all() else "nothing of the surface"

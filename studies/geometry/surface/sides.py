@@ -59,9 +59,9 @@ def places_on(
 def with_middles(
     shape: Shape, points: np.ndarray, triangles: np.ndarray, regions: Sequence[Region], curved: bool
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Points followed by the mid-side nodes of all edges (m, 3) [m], and facets (t, 6): corners, then the nodes between
-    first and second, second and third, third and first. curved: whether mid-side nodes are projected onto f = 0 and the
-    outlines of `regions`; else they are midpoints."""
+    """Points and the mid-side nodes of all edges (m, 3) [m], and facets (t, 6): corners, then the nodes between first
+    and second, second and third, third and first. curved: whether these are projected onto f = 0 and the outlines of
+    `regions`."""
     edges, count = unique_edges(triangles), len(points)
     middles = points[edges].mean(axis=1)
     if curved:

@@ -37,11 +37,11 @@ def outlined(
 def snap_region(
     shape: Shape, points: np.ndarray, triangles: np.ndarray, region: Region, fixed: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Moves the nearer end of each edge that crosses level = 0 along the surface onto the curve.
+    """Moves the nearer end of each edge that crosses level = 0 along the surface onto the curve: points, triangles, and
+    the mask (n,) of nodes on the curve.
 
     points (n, 3) [m] on f = 0; fixed (n,) bool: nodes that stay. An edge of which neither end can move is flipped in
-    its quadrilateral. Returns points, triangles, and the mask (n,) of nodes on the curve. Raises StudyError if edges
-    still cross the curve at the end, because the mesh is too coarse for the region.
+    its quadrilateral. Raises StudyError if edges still cross at the end, because the mesh is too coarse for the region.
     """
     tolerance = ON_CURVE * shape.size
     for floor in FLOORS:

@@ -10,10 +10,8 @@ FLAT = 1e-20
 
 @compiled
 def squared_to_segment(w0: float, w1: float, w2: float, d0: float, d1: float, d2: float):
-    """Squared distance of a point to a segment, |w - s d|² at the nearest s in [0, 1].
-
-    w: from the start of the segment to the point; d: from its start to its end.
-    """
+    """Squared distance of a point to a segment, |w - s d|² at the nearest s in [0, 1]; w: from its start to the point;
+    d: from its start to its end."""
     length = d0 * d0 + d1 * d1 + d2 * d2
     along = w0 * d0 + w1 * d1 + w2 * d2
     s = min(max(along / length, 0.0), 1.0) if length > 0.0 else 0.0
@@ -78,11 +76,9 @@ def nearest_into(
 
 @compiled
 def band_distance_into(corners: np.ndarray, reach: float, scratch: np.ndarray, squared: np.ndarray, owner: np.ndarray):
-    """Lowers squared (a, b, c) to the squared distance to the triangles, at grid points within `reach` of their boxes.
-
-    Lengths are in cells, coordinates relative to the first grid point. corners (t, 3, 3); scratch (4, 3); owner
-    (a, b, c) gets the index of the nearest triangle.
-    """
+    """Lowers squared (a, b, c) to the squared distance to the triangles, at grid points within `reach` of their boxes;
+    owner (a, b, c) gets the index of the nearest one. Lengths in cells, coordinates from the first grid point; corners
+    (t, 3, 3); scratch (4, 3)."""
     u, v, n, p = scratch
     for f in range(len(corners)):
         triangle = corners[f]
@@ -105,10 +101,8 @@ def band_distance_into(corners: np.ndarray, reach: float, scratch: np.ndarray, s
 
 @compiled
 def far_distance_into(corners: np.ndarray, reach: float, owner: np.ndarray, scratch: np.ndarray, squared: np.ndarray):
-    """Lowers squared (a, b, c), where it is over reach², to the squared distance to the triangle owner (a, b, c).
-
-    Lengths are in cells. corners (t, 3, 3); scratch (4, 3).
-    """
+    """Lowers squared (a, b, c), where it is over reach² [cells²], to that to the triangle owner (a, b, c); corners (t,
+    3, 3); scratch (4, 3)."""
     u, v, n, p = scratch
     for i in range(squared.shape[0]):
         for j in range(squared.shape[1]):
