@@ -3,8 +3,8 @@ from .dynamics.modes import natural_frequencies as natural_frequencies
 from .dynamics.motion_path import DynamicsSettings as DynamicsSettings
 from .dynamics.motion_path import Moment as Moment
 from .dynamics.motion_path import motion_path as motion_path
-from .elements.curve import curve as curve
 from .elements.evaluate import Evaluator as Evaluator
+from .elements.shapes import curve as curve
 from .elements.shapes import facet_nodes as facet_nodes
 from .elements.shapes import nodes as nodes
 from .elements.shapes import surface_triangles as surface_triangles

@@ -66,7 +66,6 @@ def touch(
     grip: Grip = NO_GRIP,
     guess: np.ndarray = NO_GUESS,
 ) -> Touch:
-    """A Touch with room for its results."""
     zeros = np.zeros_like(multiplier), np.zeros_like(grip.traction), np.zeros((len(rows), 3))
     return Touch(rows, shift, multiplier, penalty, grip, guess, *zeros)
 

@@ -1,18 +1,19 @@
 """Time integration: failed steps are halved and steps then grow again; an account of the energy is kept.
 
-docs/theory.md, eq. 6.12.
+docs/theory.md, eqs. 6.11 and 6.12.
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
 from reference_fem.dynamics.inertia import Instant, Motion, MovingSystem, Scheme, TimeStep
-from reference_fem.dynamics.release import held_motion, released
 from reference_fem.errors import SolveError
 from reference_fem.statics.equilibrium import EASY, Equilibrium
 from reference_fem.statics.newton import StepFailed, solve_step
+from reference_fem.statics.tangent import Tangent
 from reference_fem.system import assembly
 from reference_fem.system.state import State
 
@@ -44,7 +45,6 @@ class Account:
         self.now = self.powers(motion)
 
     def powers(self, motion: Motion) -> Powers:
-        """Forces, pressures and dissipation of a motion."""
         system, state = self.system, motion.state
         loads = system.loads_of(state)
         evaluation = system.evaluate(state.x, loads, tangent=False)
@@ -55,7 +55,6 @@ class Account:
         return Powers(np.asarray(loads.force), rows, push, reaction, pressures, evaluation.volumes, dissipation)
 
     def book(self, old: Motion, new: Motion):
-        """Adds the step from `old` to `new`."""
         system, before, now = self.system, self.now, self.powers(new)
         moved = new.state.x - old.state.x
         n, held = system.displacement_count, system.pattern.held
@@ -127,9 +126,65 @@ class March:
         self.iterations, self.substeps = self.iterations + state.iterations, self.substeps + 1
 
     def stuck(self, t: float, failure: Exception, path: Sequence[Equilibrium]):
-        """The exception for a motion that even the shortest step cannot continue."""
         return SolveError(
             f"no motion found between t = {self.motion.state.t:g} s (the last that converged) and t = {t:g} s: "
             f"{failure}; refine the mesh where it folds, or ask for less",
             converged=path,
         )
+
+
+def held_motion(system: MovingSystem, t: float, dt: float):
+    """Velocity and acceleration of the prescribed unknowns at time t, by differences of the second order.
+
+    Central; forward while t - dt lies before the start, where a motion need not be defined.
+    """
+    if t - dt < system.settings.start:
+        now, one, two, three = (system.held_at(t + k * dt) for k in range(4))
+        return (-3.0 * now + 4.0 * one - two) / (2.0 * dt), (2.0 * now - 5.0 * one + 4.0 * two - three) / dt**2
+    before, now, after = (system.held_at(t + k * dt) for k in (-1, 0, 1))
+    return (after - before) / (2.0 * dt), (after - 2.0 * now + before) / dt**2
+
+
+def released(system: MovingSystem, state: State, v: np.ndarray, dt: float) -> Motion:
+    """The motion that starts from the displacement in `state` with velocities v (3 N2,).
+
+    M a + B p = load - f(u, 0) - c M v and B·a - 2 C p / dt² = -(g(u + dt v) + g(u - dt v)) / dt², with the tangent's
+    blocks B and -C and the volume misfit g at p = 0: the pressure is the one that leaves J - 1 = p/kappa true after a
+    step of constant acceleration. For a soft bulk that is the elastic pressure, for a stiff one the multiplier of the
+    hidden constraint d²J/dt² = 0; any other start would ring from step to step.
+    """
+    n, held = system.displacement_count, system.pattern.held
+    v = v.copy()
+    v[held], held_a = held_motion(system, state.t, dt)
+    x = np.concatenate((state.x[:n], np.zeros(system.total - n)))
+    loads = system.loads_of(replace(state, load=1.0, x=x))
+    for k, lumen in enumerate(system.lumens):
+        if lumen.by_pressure:
+            x[system.field_count + k] = loads.filling[k]
+    evaluation = system.evaluate(x, loads)
+    evaluation.residual[:n] += system.damping * system.inertia(v)
+    evaluation.residual[n:] = 0.0
+    for sign in (1.0, -1.0):
+        y = x.copy()
+        y[:n] += sign * dt * v
+        evaluation.residual[n:] += system.evaluate(y, loads, tangent=False).residual[n:] / dt**2
+    put_mass(system, evaluation.values, dt)
+    solution = Tangent(system, evaluation).newton(held_a)
+    x[n:] += solution[n:]
+    return Motion(
+        replace(state, load=1.0, x=x),
+        v,
+        solution[:n],
+        solution[:n].copy(),
+    )
+
+
+def put_mass(system: MovingSystem, values: np.ndarray, dt: float):
+    """Tangent values with the mass in place of the stiffness, and the compressibility over dt²/2, in place."""
+    pattern, n = system.pattern, system.displacement_count
+    count, displaced = len(pattern.indices), pattern.free < n
+    rows = np.repeat(np.arange(len(pattern.free)), np.diff(pattern.indptr))
+    lifted = np.repeat(np.arange(len(pattern.free)), np.diff(pattern.lift_indptr))
+    stiff = np.concatenate((displaced[rows] & displaced[pattern.indices], displaced[lifted], [False]))
+    values[stiff] = system.mass.values[stiff]
+    values[:count][~displaced[rows]] *= 2.0 / dt**2

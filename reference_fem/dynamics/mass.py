@@ -32,7 +32,6 @@ def element_masses(elements: Elements, density: float, order: int):
 
 
 def build_mass(system: System) -> Mass:
-    """Consistent mass of a system, by the quadrature of its elements."""
     problem, elements = system.problem, system.elements
     local = element_masses(elements, problem.density, problem.order)
     count, width = len(system.nodes), len(elements.sizes.functions)

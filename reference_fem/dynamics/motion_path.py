@@ -112,7 +112,6 @@ def given_start(system: MovingSystem, velocity0: ArrayLike | None, start: Equili
 
 
 def moment(system: MovingSystem, march: March) -> Moment:
-    """The Moment at which the march is."""
     motion, account = march.motion, march.account
     seen = describe(system, motion.state, march.iterations, march.substeps)
     march.iterations = march.substeps = 0

@@ -1,9 +1,11 @@
 """Taylor and Hood's P2/P1 elements on one mesh: their unknowns, reference tables and geometry, from scikit-fem."""
 
+from collections.abc import Callable
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
-from skfem import ElementTetP1, ElementTetP2, ElementTriP2, MeshTet
+from skfem import ElementTetP1, ElementTetP2, ElementTriP2, MeshTet, MeshTet2
 from skfem.assembly import Dofs
 from skfem.quadrature import get_quadrature
 from skfem.refdom import RefTet, RefTri
@@ -182,3 +184,21 @@ def surface_triangles(mesh: MeshTet) -> np.ndarray:
     table = facet_nodes(mesh)
     quarters = ((0, 3, 5), (3, 1, 4), (5, 4, 2), (3, 4, 5))
     return np.vstack([table[:, q] for q in quarters])
+
+
+def curve(
+    mesh: MeshTet, project: Callable[[np.ndarray], np.ndarray], on_surface: Callable[[np.ndarray], np.ndarray]
+) -> MeshTet2:
+    """A second-order mesh whose mid-side nodes on a surface lie on that surface.
+
+    project: (3, N) points -> (3, N) points on the true surface [m].
+    on_surface: (3, N) points -> bool (N,); a boundary facet is curved when its three vertices are on it.
+    The vertices stay. Elements folded by the move are refused when the problem is set up.
+    """
+    curved = MeshTet2.from_mesh(mesh)
+    points = nodes(mesh).T.copy()
+    table = facet_nodes(mesh)
+    chosen = np.asarray(on_surface(points), dtype=bool)[table[:, :3]].all(axis=1)
+    middles = np.unique(table[chosen, 3:])
+    points[:, middles] = project(points[:, middles])
+    return replace(curved, doflocs=points)

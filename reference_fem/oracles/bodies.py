@@ -7,8 +7,7 @@ from dataclasses import replace
 import numpy as np
 from skfem import MeshTet, MeshTet2
 
-from reference_fem.elements.curve import curve
-from reference_fem.elements.shapes import nodes
+from reference_fem.elements.shapes import curve, nodes
 from reference_fem.model.problem import PrescribedDisplacement
 
 

@@ -93,7 +93,6 @@ def l2(field: np.ndarray, weights: np.ndarray):
 
 
 def measure() -> Outcome:
-    """Orders between the two finest meshes."""
     problems = [build(cells) for cells in CELLS]
     errors = np.array([relative_errors(problem) for problem in problems])
     sizes, about = tuple(1.0 / cells for cells in CELLS), f"cube, {problems[-1].mesh.nelements} P2/P1"

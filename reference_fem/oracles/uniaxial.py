@@ -1,8 +1,11 @@
-"""A block pulled and squeezed along one axis, its sides free: the state is homogeneous, so any mesh is exact."""
+"""Homogeneous states, in which any mesh is exact: a block pulled and squeezed along one axis, its sides free; and one
+whose whole boundary moves affinely."""
 
+import numpy as np
 from skfem import MeshTet
 
 from reference_fem import exact
+from reference_fem.elements.shapes import nodes
 from reference_fem.model.material import Material, MooneyRivlin, NeoHookean
 from reference_fem.model.problem import PrescribedDisplacement, Problem
 from reference_fem.oracles.base import Check, Oracle, Outcome, unknowns
@@ -24,7 +27,6 @@ def pull(material: Material, stretch: float, mesh: MeshTet):
 
 
 def measure() -> Outcome:
-    """Force and volume at four stretches."""
     mesh, checks = block(skew=0.1), []
     for law, material in LAWS.items():
         for stretch in STRETCHES:
@@ -41,3 +43,34 @@ def measure() -> Outcome:
 
 
 ORACLE = Oracle("uniaxial", "Block with free sides, pulled and squeezed", "closed form at kappa = 1000 mu", measure)
+
+
+STRAIN = 5e-4
+"""Volume change, so that the pressure is not zero."""
+RATIOS = (10.0, 1e3, 1e5)
+
+
+def affine():
+    """A shear and stretch with det F = 1 + STRAIN, (3, 3)."""
+    F = np.array([[1.1, 0.2, 0.0], [0.0, 0.95, 0.1], [0.05, 0.0, 0.98]])
+    return F * ((1.0 + STRAIN) / np.linalg.det(F)) ** (1.0 / 3.0)
+
+
+def measure_patch() -> Outcome:
+    """Largest error of displacement and pressure, from kappa/mu = 10 to 1e5."""
+    mesh, checks = block(skew=0.1), []
+    x, F = nodes(mesh), affine()
+    shape = lambda x: (F - np.eye(3)) @ x  # noqa: E731
+    held = [PrescribedDisplacement(lambda x: np.ones(x.shape[1], bool), (0, 1, 2), lambda t: (t, t, t), shape)]
+    for ratio in RATIOS:
+        problem = Problem(mesh, MooneyRivlin(0.3, 0.2, ratio), held)
+        state = equilibrium_path(problem, [1.0], TIGHT)[0]
+        misfit = float(np.abs(state.u - x @ (F - np.eye(3)).T).max())
+        about = (f"block, {mesh.nelements} P2/P1", unknowns(problem))
+        checks.append(Check(f"worst u error, kappa/mu {ratio:g}", "m", 0.0, misfit, 1e-8, *about, absolute=True))
+        worst = float(state.p[np.argmax(np.abs(state.p - ratio * STRAIN))])
+        checks.append(Check(f"worst pressure, kappa/mu {ratio:g}", "mu", ratio * STRAIN, worst, 1e-8, *about))
+    return Outcome(tuple(checks))
+
+
+PATCH_ORACLE = Oracle("patch", "Patch test: affine boundary, constant pressure", "closed form", measure_patch)

@@ -104,7 +104,6 @@ def points_between(system: System, touch: FaceTouch, x: np.ndarray, change: np.n
 
 
 def together(one: Points, other: Points) -> Points:
-    """Points of both, without their places."""
     directions = sp.csr_matrix(sp.vstack([one.directions, other.directions]))
     gap, m, eps, area, touching, excess = (np.concatenate(both) for both in zip(one[1:-1], other[1:-1], strict=True))
     return Points(directions, gap, m, eps, area, touching, excess, ())

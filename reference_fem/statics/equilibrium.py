@@ -131,7 +131,6 @@ def advance(system: System, state: State, t: float, load: float, path: Sequence[
 
 
 def stuck(state: State, t: float, failure: Exception, path: Sequence[Equilibrium]):
-    """The exception for a path that cannot go on."""
     gravity = f" under {100 * state.load:.3g} % of what acts at the start" if state.load < 1.0 else ""
     return SolveError(
         f"no equilibrium found between t = {state.t:g} s{gravity} (the last that converged) and t = {t:g} s: "
@@ -141,7 +140,6 @@ def stuck(state: State, t: float, failure: Exception, path: Sequence[Equilibrium
 
 
 def describe(system: System, state: State, iterations: int, substeps: int) -> Equilibrium:
-    """The Equilibrium of a converged state."""
     n, elements = system.displacement_count, system.elements
     evaluation = system.evaluate(state.x, system.loads_of(state), tangent=False)
     slip = farthest_slip(state.x, system.faces, evaluation.faces)

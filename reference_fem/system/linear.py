@@ -151,7 +151,6 @@ class ScipyFactors:
         return self.solve_with(b)
 
     def release(self):
-        """Forget the factors."""
         self.solve_with = np.asarray
 
 
@@ -174,7 +173,6 @@ class SymmetricSolver:
         self.try_factor(afresh=False)
 
     def try_factor(self, afresh: bool):
-        """Factorise; raises SingularTangent."""
         try:
             self.factors.factor(self.upper, afresh)
         except self.factors.failure as problem:
@@ -216,9 +214,7 @@ class SymmetricSolver:
         return x, misfit
 
     def product(self, x: np.ndarray):
-        """K x."""
         return self.upper @ x + self.upper.T @ x - (self.upper.diagonal() * x.T).T
 
     def release(self):
-        """Give the memory of the factors back."""
         self.factors.release()

@@ -82,7 +82,6 @@ class System:
         checks.check_held(self.nodes, held_dofs)
 
     def build_surface(self, facets: Facets):
-        """Tables of the boundary for the contact kernel."""
         dofs = np.hstack([3 * facets.nodes + c for c in range(3)])
         penalty = self.settings.penalty * self.problem.material.mu / np.sqrt(facets.weights.sum(axis=1))
         positions = self.pattern.positions(dofs)
@@ -116,7 +115,6 @@ class System:
         return force
 
     def rest(self) -> State:
-        """The state that every path starts from."""
         shape = (len(self.rows), *self.surface.weights.shape)
         x, start = np.zeros(self.total), self.settings.start
         grip = contact.first_grip(self.obstacles_at(start), self.sticks, self.surface, x, TOUCHING * np.ptp(self.nodes))
@@ -138,7 +136,6 @@ class System:
         return bool(np.any(self.force_at(start)) or np.any(self.filling_at(start, 1.0) != self.filling_at(start, 0.0)))
 
     def loads_of(self, state: State) -> Loads:
-        """The loads of a converged state."""
         rows, filling = self.obstacles_at(state.t), self.filling_at(state.t, state.load)
         force = self.force_at(state.t, state.load)
         return Loads(force, rows, state.multiplier, filling, state.stiffness, grip=state.grip, faces=state.faces)
