@@ -15,8 +15,6 @@ from massspring import (
     simulate,
     tetrahedral_body,
 )
-from massspring.kernels.arrays.layout import Push
-from massspring.kernels.contact.active_set import find_contacts, pressure_reach, revise_contacts
 from massspring.kernels.contact.node_contact import ON_EDGE
 from tests.massspring.conftest import SOFT, block
 from tests.massspring.methods.test_methods import clock_for, squeeze
@@ -83,37 +81,6 @@ def test_the_distance_to_a_capsule_is_that_to_the_nearest_of_many_spheres():
     axis = capsule.anchor + np.linspace(0, 1, 2001)[:, None] * capsule.span + [0.005, 0, 0]
     nearest = np.linalg.norm(points[:, None] - axis[None], axis=2).min(axis=1) - 0.004
     assert np.allclose(capsule.gap(points, 0.5), nearest, atol=1e-6)
-
-
-def test_looking_only_at_near_nodes_changes_no_bit(ball_body):
-    """The skip of the contact revision: with the bound on the motion, or looking at every node, the same contacts."""
-    clock = clock_for(ball_body, 30, 10)
-    planes = squeeze(ball_body, 0.01, clock.duration)
-    setup = Setup(ball_body, ImplicitVolume(), clock, planes, damping=30.0)
-    state, changes, skipped = setup.start(), 0, 0
-    for frame in range(30):
-        state = setup.method.advance(state, setup.boundary(frame))
-        boundary, net, dt = setup.boundary(frame), state.model, clock.dt
-        lightest = net.inverse_mass.max()
-        for factor in (-3.0, 0.5, 1.0, 5.0):
-            nodes, push = state.nodes, Push(state.nodes.gradient, state.lam[0])
-            near, far = (_copied(state.contacts) for _ in range(2))
-            for contacts in (near, far):
-                find_contacts(net, nodes, contacts, boundary, 0, push)
-            lam = factor * state.lam[0]
-            mobility = float((net.inverse_mass[:, None] * nodes.gradient**2).sum())
-            reach = pressure_reach(lam - state.lam[0], mobility, lightest, dt)
-            changed = revise_contacts(net, nodes, near, boundary, 0, Push(nodes.gradient, lam), reach)
-            assert changed == revise_contacts(net, nodes, far, boundary, 0, Push(nodes.gradient, lam), np.inf)
-            for name in ("contact_id", "mode", "normal", "v_target"):
-                assert np.array_equal(getattr(near, name), getattr(far, name))
-            changes += changed
-            skipped += int((near.predicted_gap[ball_body.surface_nodes] > reach).sum())
-    assert changes > 0 and skipped > 0, "the test saw no change of contact, or nothing to skip"
-
-
-def _copied(contacts):
-    return type(contacts)(*(values.copy() for values in contacts))
 
 
 def wedge_of(depth: float, duration: float, angle: float) -> tuple[Plane, Plane]:
