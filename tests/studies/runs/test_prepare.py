@@ -1,0 +1,230 @@
+"""From a scene to the mass-spring set-up: mesh, body with its law and masses, attachments, clock."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from massspring import MassSpringError, Trajectory, Volumes
+from reference_fem import exact
+from studies.base.errors import StudyError
+from studies.geometry import HalfSpace
+from studies.meshing.scene_mesh import mesh_for, patch_nodes
+from studies.runs.case import Case
+from studies.runs.prepare import attachments_for, body_for, prepare
+from studies.runs.recipes import BODIES, MembraneBody, QuadraticBody, TetrahedralBody
+from studies.runs.run import measure
+from studies.scene.library import BLADDER_FILL
+from studies.scene.library.ball_clamped import BALL_CLAMPED
+from studies.scene.library.ball_squeeze import BALL_SQUEEZE, DEPTH, PRESS_END, RADIUS
+from studies.scene.scene import Held
+from studies.store.record import Status
+from tests.campaigns import campaign
+from tests.studies.tiny import NODES, SQUEEZE, cube, file_scene, tiny_case, write_obj
+
+CLAMPED = replace(BALL_CLAMPED, reference=None)
+
+
+@pytest.fixture(scope="module")
+def ball_mesh(mesh_cache):
+    return mesh_for(CLAMPED, NODES)
+
+
+def test_only_a_tetrahedral_body_is_filled():
+    filled, hollow = (prepare(tiny_case(body=BODIES[kind](NODES))) for kind in ("tetrahedral", "surface"))
+    assert len(filled.mesh.tetrahedra) == len(filled.setup.body.tetrahedra) > 0
+    assert len(hollow.mesh.tetrahedra) == len(hollow.setup.body.tetrahedra) == 0
+    assert abs(hollow.mesh.surface_count - NODES) <= 0.02 * NODES + 1
+    # The paper's body has virtual nodes on its axis on top of the mesh.
+    assert hollow.setup.body.node_count > len(hollow.mesh.points)
+
+
+def test_stiffness_multiplies_every_spring(ball_mesh):
+    soft, stiff = (body_for(CLAMPED, TetrahedralBody(nodes=NODES, stiffness=k), ball_mesh) for k in (1.0, 4.0))
+    np.testing.assert_allclose(stiff.springs.stiffness, 4.0 * soft.springs.stiffness, rtol=1e-15)
+    np.testing.assert_array_equal(stiff.mass, soft.mass)
+
+
+@pytest.mark.parametrize("kind", ["tetrahedral", "surface"])
+def test_the_masses_add_up_to_density_times_volume(ball_mesh, kind):
+    """A body of the scene's tissue, whatever the stiffness; sums of a few hundred terms round far below 1e-12."""
+    dense = replace(CLAMPED, tissue=replace(CLAMPED.tissue, density=1234.5))
+    for scene in (CLAMPED, dense):
+        body = body_for(scene, BODIES[kind](NODES, stiffness=3.0), ball_mesh)
+        assert body.mass.sum() == pytest.approx(scene.tissue.density * ball_mesh.volume, rel=1e-12)
+
+
+def test_the_laws_differ_and_match_the_tissue(ball_mesh):
+    """Both have Σ k L² = 15 μ V, so that they mean the same tissue (docs: stiffness laws)."""
+    volume, shear = ball_mesh.volume, CLAMPED.tissue.shear_modulus
+    springs = [
+        body_for(CLAMPED, TetrahedralBody(nodes=NODES, law=law), ball_mesh).springs for law in ("van_gelder", "uniform")
+    ]
+    for network in springs:
+        assert network.stiffness @ network.rest_length**2 == pytest.approx(15 * shear * volume, rel=1e-9)
+    assert not np.allclose(springs[0].stiffness, springs[1].stiffness, rtol=0.01)
+
+
+def test_attachments_are_the_caps_with_their_paths(ball_mesh):
+    bottom, top = attachments_for(CLAMPED, ball_mesh)
+    height = ball_mesh.points[:, 2]
+    cap = 0.8 * 0.05
+    # The outline of a cap is an edge of the mesh: all nodes beyond it, and those on it to the mesher's tolerance.
+    assert set(np.flatnonzero(height[: ball_mesh.surface_count] > cap * (1 + 1e-6))) <= set(top.nodes)
+    assert (height[top.nodes] > cap * (1 - 1e-6)).all()
+    assert (height[bottom.nodes] < -cap * (1 - 1e-6)).all()
+    assert top.path == CLAMPED.held[1].path
+    assert bottom.path == Trajectory()
+
+
+def test_a_mesh_from_a_file_is_attached_where_the_region_is(tmp_path):
+    points, triangles, _ = cube(2)
+    outer = np.unique(triangles)
+    top = HalfSpace((0.0, 0.0, 0.04), (0.0, 0.0, -1.0))
+    scene = file_scene(write_obj(tmp_path / "box.obj", points[outer], np.searchsorted(outer, triangles)))
+    mesh = mesh_for(replace(scene, held=(Held("top", top),)), 0, filled=True)
+    assert len(mesh.tetrahedra)
+    nodes = patch_nodes(mesh, "top", top)
+    assert len(nodes) == 9
+    assert (mesh.points[nodes, 2] == 0.05).all()
+
+
+def test_dt_auto_is_the_fraction_of_the_limit_of_the_held_body():
+    case = tiny_case(scene=CLAMPED, body=TetrahedralBody(nodes=100))
+    half, tenth = prepare(case), prepare(case.replaced(dt_fraction=0.1))
+    for prepared, fraction in ((half, 0.5), (tenth, 0.1)):
+        clock = prepared.setup.clock
+        most = fraction * prepared.limit.damped
+        assert most * clock.steps / (clock.steps + 1) < clock.dt <= most
+    fixed = prepare(case.replaced(dt=1e-3)).setup.clock
+    assert fixed.dt == pytest.approx(1e-3, rel=1e-9)
+
+
+def test_frames_of_the_case_come_before_those_of_the_scene():
+    assert prepare(tiny_case(frames=7)).setup.clock.frames == 7
+    assert prepare(tiny_case(frames=None)).setup.clock.frames == SQUEEZE.frames
+
+
+def test_a_dt_above_the_limit_is_refused_unless_the_case_allows_it():
+    limit = prepare(tiny_case()).limit.damped
+    case = tiny_case(dt=2 * limit, frames=100)
+    with pytest.raises(MassSpringError, match=f"above the stability limit of {limit:.3g} s; take a smaller dt"):
+        prepare(case)
+    with pytest.raises(MassSpringError, match="above the stability limit"):
+        prepare(tiny_case(dt_fraction=1.5, frames=100))
+    assert prepare(case.replaced(beyond_limit=True)).setup.clock.dt > limit
+
+
+@pytest.fixture(scope="module")
+def mesh():
+    return mesh_for(BALL_SQUEEZE, 300)
+
+
+def test_lloyd_overshoots_on_a_mesh_of_gmsh(mesh):
+    """By about a fifth: 1.25 at 150 surface nodes, 1.22 at 300, 1.18 at 1,100; matched it does not."""
+    mu = BALL_SQUEEZE.tissue.shear_modulus
+    modulus = {}
+    for law in ("lloyd", "lloyd_matched", "van_gelder"):
+        springs = body_for(BALL_SQUEEZE, TetrahedralBody(nodes=300, law=law), mesh).springs
+        modulus[law] = float(springs.stiffness @ springs.rest_length**2) / (15 * mesh.volume * mu)
+    assert modulus["lloyd"] == pytest.approx(1.2, abs=0.05)  # the spread over meshes
+    assert modulus["lloyd_matched"] == pytest.approx(1.0, rel=1e-9)
+    assert modulus["van_gelder"] == pytest.approx(1.0, rel=1e-9)
+
+
+def test_the_cotangent_law_is_built_with_its_volumes_and_recorded(mesh):
+    case = Case(BALL_SQUEEZE, TetrahedralBody(nodes=150, law="cotangent", volumes="nodal"), frames=20)
+    prepared = prepare(case)
+    assert prepared.setup.body.rest_pressure == BALL_SQUEEZE.tissue.shear_modulus
+    record = measure(case.replaced(scene=replace(BALL_SQUEEZE, reference=None)))
+    assert record.attributes["law"] == "cotangent"
+
+
+def test_an_unknown_law_is_refused_with_the_nearest():
+    with pytest.raises(StudyError, match="unknown stiffness law 'van_geldr'; did you mean 'van_gelder'"):
+        TetrahedralBody(law="van_geldr")
+
+
+def test_without_them_the_run_fails_with_a_sentence():
+    record = measure(Case(BALL_SQUEEZE, TetrahedralBody(nodes=150, law="cotangent"), frames=20))
+    assert record.status == Status.FAILED and "keep one volume per node" in record.message
+
+
+def test_stiffness_moves_the_rest_pressure_with_the_springs(mesh):
+    body = body_for(BALL_SQUEEZE, TetrahedralBody(nodes=300, law="cotangent", volumes="nodal", stiffness=2.0), mesh)
+    assert body.rest_pressure == 2 * BALL_SQUEEZE.tissue.shear_modulus
+    assert body.kept.count == Volumes.nodal(body).count
+
+
+@pytest.mark.campaign
+def test_a_hollow_organ_can_be_a_membrane():
+    """As thick as the wall is in the mean, as heavy as wall and content, filled like the organ."""
+    case = Case(BLADDER_FILL, MembraneBody(nodes=400, law="delingette"), frames=20)
+    prepared = prepare(case)
+    body, mesh = prepared.setup.body, mesh_for(BLADDER_FILL, 400)
+    assert body.mass.sum() == pytest.approx(BLADDER_FILL.tissue.density * mesh.outer_volume, rel=1e-2)
+    assert body.node_count == mesh.outer_count and len(body.membrane.triangles) == len(body.triangles)
+    assert case.name == "bladder_fill-membrane-400-implicit_volume-dt0.5-delingette"
+    (name, ramp), grown = next(iter(prepared.setup.targets.items())), mesh.lumen_volume / mesh.outer_volume
+    assert name == "whole" and ramp.values[-1] == pytest.approx(1 + 0.2 * grown, rel=1e-9)
+
+
+def test_a_membrane_needs_a_wall():
+    record = measure(Case(BALL_SQUEEZE, MembraneBody(nodes=400), frames=20))
+    assert record.status == Status.FAILED and "solid organ" in record.message
+
+
+def force_errors(nodes: int) -> np.ndarray:
+    """Relative errors of the plate force of springs without length, from a tenth to 0.3 of the diameter."""
+    record = measure(Case(BALL_SQUEEZE, TetrahedralBody(nodes=nodes, law="cotangent", volumes="nodal")))
+    assert record.status == Status.OK
+    t, force = record.fields["t"].values, record.fields["contact_force"].values[:, 0, 2]
+    unit = BALL_SQUEEZE.tissue.shear_modulus * RADIUS**2
+    shares = (0.10, 0.15, 0.20, 0.25, 0.30)
+    frames = [int(np.argmin(np.abs(t - PRESS_END * share / DEPTH))) for share in shares]
+    truth = np.array([exact.BALL_BETWEEN_PLANES[share][0] for share in shares])
+    return np.abs(force[frames]) / (unit * truth) - 1
+
+
+@pytest.mark.slow
+def test_springs_without_length_press_as_the_incompressible_ball():
+    """Against the axisymmetric solution (oracle 5): within 25 %, and better on the finer mesh.
+
+    Measured: 5 to 10 % above it with 150 surface nodes, 2.5 to 4.5 % with 300, where one volume leaves −40 %.
+    """
+    coarse, fine = force_errors(150), force_errors(300)
+    assert np.abs(coarse).max() < 0.25 and np.abs(fine).max() < 0.06
+    assert np.abs(fine).mean() < 0.6 * np.abs(coarse).mean()
+
+
+SHARES = (0.05, 0.10, 0.15, 0.20, 0.25, 0.30)
+VERTICES = 150
+
+
+def errors(contact: str, fraction: float) -> tuple[np.ndarray, np.ndarray]:
+    """Of the plate force at SHARES of the diameter and of the equator's radius at the first five, relative.
+
+    The ball may drift sideways, so its radius is half of its width.
+    """
+    recipe = QuadraticBody(4 * VERTICES - 6, mass="stiffness", contact=contact)  # pyright: ignore[reportArgumentType]
+    record = measure(Case(BALL_SQUEEZE, recipe, dt_fraction=fraction))
+    assert record.status == Status.OK, record.message
+    t, force = record.fields["t"].values, record.fields["contact_force"].values[:, 0, 2]
+    frames = [int(np.argmin(np.abs(t - PRESS_END * share / DEPTH))) for share in SHARES]
+    truth, equator = np.array([exact.BALL_BETWEEN_PLANES[share] for share in SHARES]).T
+    unit = BALL_SQUEEZE.tissue.shear_modulus * RADIUS**2
+    at = [int(np.argmin(np.abs(record.fields["snapshot_frame"].values - frame))) for frame in frames[:5]]
+    width = np.ptp(record.fields["snapshots"].values[at][:, :, :2], axis=1).mean(axis=1)
+    return np.abs(force[frames]) / (unit * truth) - 1.0, 0.5 * width / RADIUS / equator[:5] - 1.0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("contact", "fraction"), [campaign("nodes", 0.5), ("facets", 0.5)])
+def test_a_quadratic_ball_presses_as_the_incompressible_ball(contact, fraction, mesh_cache):
+    """150 vertices on the surface: force within 2 % from a tenth of the diameter on, 4 % before, equator within 0.1 %.
+
+    Measured: −0.9 to 0.6 % with nodes, −0.8 to 0.2 % inside facets.
+    """
+    force, equator = errors(contact, fraction)
+    assert abs(force[0]) < 0.04 and np.abs(force[1:]).max() < 0.02
+    assert np.abs(equator).max() < 1e-3
