@@ -90,7 +90,7 @@ def area_error(organ: Organ, held: Held, points: np.ndarray, facets: np.ndarray)
 
 def level_that_holds(level: int, most: int, lost: Callable[[int], float], bound: float) -> int:
     """The first level from `level` to `most`, in steps by the factor FINER, with `lost(level)` of at most `bound`; if
-    there is none, the level with the least. Raises the first StudyError if no level can be meshed."""
+    there is none, that with the least. Raises the first StudyError if no level can be meshed."""
     losses, failed = list[tuple[float, int]](), list[StudyError]()
     while level <= most or not (losses or failed):
         try:

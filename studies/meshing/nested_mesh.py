@@ -120,15 +120,15 @@ class NestedMesh:
         return max((error for error in errors if error == error), default=0.0)
 
     def lumen_at(self, t: float) -> np.ndarray | None:
-        """Middles of the corners of the facets of a filled lumen [m], (f, 3); None if it is not filled at time t [s]: a
-        cut may drain it."""
+        """Middles of the facets of a filled lumen [m], (f, 3), by their corners; None if it is not filled at time t
+        [s]: a cut may drain it."""
         if not self.scene.filled_at(t):
             return None
         return nodes(self.mesh)[self.body.facets(self.mesh)[-1][:, :3]].mean(axis=1)
 
     def finer(self, indicator: np.ndarray, elements: int) -> tuple["NestedMesh", np.ndarray]:
-        """A mesh of about `elements` elements in which those with the largest indicator (ne,) are halved; and for each
-        of its elements the element of this mesh of which it is a part, (new ne,)."""
+        """A mesh of about `elements` elements in which those with the largest indicator (ne,) are halved; and the
+        element of this mesh of which each is a part, (new ne,)."""
         body, parents = marked(self.body, np.where(self.small_at_outlines, 0.0, indicator), elements)
         cells, flat = element_nodes(body.mesh), MeshTet2.from_mesh(self.body.mesh)
         owner = at_nodes(body.mesh, parents)

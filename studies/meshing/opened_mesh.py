@@ -40,10 +40,9 @@ def cells_of(mesh: OrganMesh | QuadraticMesh) -> np.ndarray:
 
 
 def opened_in_stages(mesh: OrganMesh | QuadraticMesh, cuts: Sequence[Cut], shares: np.ndarray) -> list[Opened | None]:
-    """An organ's mesh opened as far as its cuts have advanced at each of e events; None for an event without newly
-    opened faces. shares (e, c): share of the path of each cut, not decreasing and finally 1; negative before it begins.
-
-    Raises StudyError for a cut that does not open it."""
+    """An organ's mesh opened as far as its cuts have advanced at each of e events; None for one without newly opened
+    faces. shares (e, c): share of the path of each cut, not decreasing and finally 1; negative before it begins. Raises
+    StudyError for a cut that does not open it."""
     whole = opened_mesh(mesh)
     parting = np.zeros(len(mesh.points), dtype=bool)
     parting[whole.parent[whole.pairs[:, 0]]] = True
@@ -101,9 +100,8 @@ def opened_mesh(mesh: OrganMesh | QuadraticMesh, along: Mapping[str, np.ndarray]
 
 
 def opened_elements(mesh: MeshTet2, faces: np.ndarray) -> tuple[MeshTet2, np.ndarray]:
-    """A second-order mesh opened along inner `faces` (f, 3), and for each of its nodes the node before, (n',).
-
-    The first vertices are those of `mesh`, the elements keep their order. Raises StudyError."""
+    """A second-order mesh opened along inner `faces` (f, 3), and for each of its nodes the node before, (n',). The
+    first vertices are those of `mesh`, the elements keep their order. Raises StudyError."""
     try:
         opening = opened(mesh.t[:4].T, faces, mesh.nvertices)
     except MassSpringError as error:
@@ -121,8 +119,8 @@ def faces_in_stages(
     path, (f,) bool each; no face closes again.
 
     The front moves over the nodes `parting` (n,) bool, those that the whole cut doubles, in the order of their position
-    `along` (n,) its direction. When it passes a node, the node is doubled and all faces around it open. A node waits if
-    the surface of the opened body would touch itself in a point or an edge.
+    `along` (n,) its direction. All faces around a node that it passes open, unless the surface of the opened body would
+    touch itself in a point or an edge: then the node waits.
     """
     first, last = along[parting].min(), along[parting].max()
     passed = np.zeros(len(parting), dtype=bool)

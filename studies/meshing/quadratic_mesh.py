@@ -59,8 +59,8 @@ def uprightness(points: np.ndarray, cells: np.ndarray, straight_volume: np.ndarr
     """How far each element (k, 10) is from folding, (k,): 1 when straight, at most 0 when it folds or a part does.
 
     The smaller of two ratios to straight_volume (k,) [m³]: of the least Bernstein coefficient of the Jacobian, over 6,
-    and of the least volume of the eight flat tetrahedra that replace the element in contact, times 8, with the best of
-    the three ways to divide its middle.
+    and of the least volume, times 8, of the eight flat tetrahedra that replace the element in contact, with its middle
+    divided best.
     """
     bent = jacobian_coefficients(points, cells).min(axis=1) / 6.0
     corners = _volumes(points, cells[:, CORNER_PARTS]).min(axis=1)

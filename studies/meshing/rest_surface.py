@@ -64,8 +64,8 @@ class RestSurface:
 
     @cached_property
     def volume(self) -> float:
-        """Volume [m³] that it encloses: negative for a lumen, whose facets are oriented into it. Exact for curved
-        facets."""
+        """Volume [m³] that it encloses, exact for curved facets; negative for a lumen, whose facets are oriented into
+        it."""
         local, weights = get_quadrature(RefTri, VOLUME_ORDER)
         centred = (self.points - self.points[self.facets].mean(axis=(0, 1)))[self.facets]
         barycentric = np.column_stack([1.0 - local.sum(axis=0), *local])

@@ -20,8 +20,8 @@ def retreat(safe: np.ndarray, target: np.ndarray, cells: np.ndarray, measure: Me
     """Share of the way from `safe` to `target` (n, 3) [m] that each node can go, (n,).
 
     While the measure of an element of `cells` (k, m) is below FLOOR, or below its value at `safe` if that is less, one
-    of its nodes moves back by a step: the node that improves the elements around it most, or all nodes if none does.
-    Raises StudyError for an element that is inverted at `safe`.
+    of its nodes moves back by a step: the one that improves the elements around it most, or all if none does. Raises
+    StudyError for an element that is inverted at `safe`.
     """
     every = np.arange(len(cells))
     at_rest = measure(safe, cells, every)

@@ -21,10 +21,10 @@ def mesh_for(
     """The scene's organ with `nodes` surface nodes, the wall of a hollow one in `layers` (None: so many that elements
     are as high as they are long). Raises StudyError.
 
-    A mesh file is used unchanged, unless its parameters ask for a new surface: "remesh": true, or "smooth" or "wall"
-    [m]. The flat sides of a new surface enclose the volume of the file's surface, or with `on_shape` its nodes are on
-    that surface, for sides that will be curved; nodes of all other organs always are on the surface. Nodes are denser
-    where the shape is more curved, or `even`ly spread for references, which are halved until they follow the shape.
+    A mesh file is used unchanged, unless its parameters ask for a new surface ("remesh", "smooth" or "wall"), whose
+    flat sides enclose the volume of the file's, or with `on_shape` whose nodes are on it, for sides that will be
+    curved. Nodes of organs are on the surface, denser where the shape is more curved, or `even`ly spread for
+    references.
     """
     if lookup(scene.organ.shape, [*SHAPES, "file"], "organ") != "file":
         sides = None if even else "curved" if on_shape else "straight"

@@ -79,7 +79,7 @@ def quadratic_mesh(
 
 def curved_points(scene: Scene, organ_mesh: OrganMesh, coarse: HeldMesh, fine: HeldMesh, shape: Shape) -> np.ndarray:
     """Nodes of the finer second-order mesh [m], (n, 3), with boundary nodes on the true shape as far as no element
-    folds. Warns of nodes that remain off it. Raises StudyError."""
+    folds, else with a warning. Raises StudyError."""
     points = laid_out(scene, organ_mesh, coarse, fine, shape)
     aim = aimed(scene, fine, shape, points)
     if fine is not coarse:
@@ -94,7 +94,7 @@ def curved_points(scene: Scene, organ_mesh: OrganMesh, coarse: HeldMesh, fine: H
 
 def drawn_points(points: np.ndarray, body: HeldMesh, share: float, name: str) -> np.ndarray:
     """Nodes at `points` (n, 3) [m], with mid-side nodes of sides that start at an outline shifted towards `share` of
-    the side, as far as no element folds."""
+    it, as far as no element folds."""
     held, mesh = all_facets(body)[:-2], MeshTet2.from_mesh(body.mesh)
     outlines = np.concatenate([*(rim_sides(facets)[:, :2].ravel() for facets in held), body.front])
     cells = upright_cells(body)
@@ -142,8 +142,8 @@ def upright_against(points: np.ndarray, cells: np.ndarray) -> Measure:
 
 
 def moved(safe: np.ndarray, target: np.ndarray, cells: np.ndarray, measure: Measure, name: str) -> np.ndarray:
-    """Points (n, 3) [m] moved from `safe` towards `target` as far as the elements allow (studies.meshing.retreat).
-    Raises StudyError."""
+    """Points (n, 3) [m] moved from `safe` towards `target` as far as the elements allow (retreat.py). Raises
+    StudyError."""
     share = retreat(safe, target, cells, measure, name)[:, None]
     # Exact for nodes that reach their target: safe + (target - safe) would be rounded.
     return np.where(share == 1.0, target, safe + share * (target - safe))

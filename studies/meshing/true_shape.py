@@ -50,8 +50,7 @@ def on_true_shape(
 
 def in_cut_planes(points: np.ndarray, body: HeldMesh, shape: Shape, cuts: tuple[Cut, ...]) -> np.ndarray:
     """P2 nodes at `points` (n, 3) [m] with those of the faces of each cut in its plane, those of its traces also on the
-    true surface, outer or of the lumen: sides that only follow the surface, or are bent by smoothing, would leave the
-    plane."""
+    true surface: sides that only follow the surface, or are bent by smoothing, would leave the plane."""
     if not cuts:
         return points
     mesh, points = MeshTet2.from_mesh(body.mesh), points.copy()
@@ -70,11 +69,9 @@ def in_cut_planes(points: np.ndarray, body: HeldMesh, shape: Shape, cuts: tuple[
 
 
 def as_curved(body: HeldMesh, coarse: HeldMesh, curved_coarse: MeshTet2) -> MeshTet2:
-    """The finer mesh with sides as curved as those of the coarse one that lie on the true shape.
-
-    The quadratic map of a coarse element takes its parts with it exactly, so parts of any size remain positive. Moving
-    each new vertex separately onto the surface would fold small elements next to large ones.
-    """
+    """The finer mesh with sides as curved as those of the coarse one on the true shape: the quadratic map of a coarse
+    element takes its parts with it, so parts of any size remain positive; moving each vertex by itself would fold small
+    elements next to large ones."""
     if body is coarse:
         return curved_coarse
     plain, finer = MeshTet2.from_mesh(coarse.mesh), MeshTet2.from_mesh(body.mesh)

@@ -60,15 +60,6 @@ def volume_of(block):
     return signed_volume(block[1] * MM, block[2])
 
 
-def test_same_file_same_mesh(block, tmp_path, monkeypatch):
-    path = block[0]
-    one = scan(path, 200, unit="mm")
-    monkeypatch.setenv("ORGANBENCH_CACHE", str(tmp_path / "other"))
-    other = scan(path, 200, unit="mm")
-    assert (one.points == other.points).all() and (one.tetrahedra == other.tetrahedra).all()
-    assert one.volume == pytest.approx(volume_of(block), rel=0.04)
-
-
 def test_without_nodes_the_triangles_stay(block):
     path, points, faces = block
     mesh = scan(path, unit="mm", fill=False)
@@ -99,42 +90,6 @@ def test_a_surface_that_crosses_itself_becomes_a_body(block, tmp_path):
     mesh = scan(path, 200, unit="mm")
     check_tetrahedra(mesh.points, mesh.tetrahedra)
     assert mesh.volume == pytest.approx(volume_of(block), rel=0.06)
-
-
-@pytest.mark.campaign
-@pytest.mark.filterwarnings("ignore:.*(is missing from the mesh|has a part here that the)")
-def test_handles_are_kept_and_a_warning_counts_them(tmp_path):
-    round_it, round_tube = 24, 12
-    i, j = (grid.ravel() for grid in np.meshgrid(np.arange(round_it), np.arange(round_tube), indexing="ij"))
-    a, b = 2 * np.pi * i / round_it, 2 * np.pi * j / round_tube
-    far = 25 + 9 * np.cos(b)
-    points = np.column_stack([far * np.cos(a), far * np.sin(a), 9 * np.sin(b)])
-    own, on, aside, both = (
-        (i + di) % round_it * round_tube + (j + dj) % round_tube for di, dj in ((0, 0), (1, 0), (0, 1), (1, 1))
-    )
-    faces = np.vstack([np.column_stack([own, on, both]), np.column_stack([own, both, aside])])
-    path = write(tmp_path / "ring.vtu", points, faces)
-    with pytest.warns(UserWarning, match=r"ring\.vtu: the body has 1 handles or tunnels, .* with --smooth"):
-        mesh = scan(path, 200, unit="mm", fill=False)
-    check_surface(mesh.points, mesh.triangles)
-    assert mesh.volume == pytest.approx(signed_volume(points * MM, faces), rel=1e-3) and mesh.losses["handles"] == 1
-
-
-@pytest.mark.campaign
-def test_a_thin_flap_is_kept_or_a_warning_names_it(tmp_path):
-    """A plate of 3 mm on an egg: a third of it is thinner than the cells of the first grid."""
-    egg = split(*box((-1, -1, -1), (1, 1, 1)), times=4)
-    points = egg[0] * (30, 25, 20) / np.linalg.norm(egg[0], axis=1, keepdims=True)
-    near = (np.abs(points[:, 2]) < 2.6) & (points[:, 1] > 10)
-    points[near, 1] += 15 * np.clip(1 - (np.abs(points[near, 0]) / 12) ** 4, 0, 1)  # pulled out to a flap
-    path = write(tmp_path / "flap.vtu", points, egg[1])
-    with warnings.catch_warnings(record=True) as records:
-        warnings.simplefilter("always")
-        mesh = scan(path, 550, unit="mm", fill=False)
-    far = mesh.losses["file_to_mesh"]
-    assert far["max"] < 0.02 * mesh.losses["diagonal"] or any("up to" in str(w.message) for w in records)
-    assert far["max"] < 0.5 * 15e-3, "the flap is there"
-    assert mesh.volume == pytest.approx(signed_volume(points * MM, egg[1]), rel=1e-3)
 
 
 def test_a_wall_makes_it_hollow(block):

@@ -9,7 +9,6 @@ from skfem.models.poisson import laplace
 
 from studies.base.errors import StudyError
 from studies.geometry import HalfSpace, ball, curved, organ
-from studies.geometry.api import organs as api
 from studies.geometry.mesh.organ_mesh import unique_edges
 from studies.geometry.mesh.quality import PAIRS, curved_volume, jacobian_coefficients, smallest_jacobian
 from studies.geometry.mesh.second_order import GOOD, make_curved, middle_stiffness, true_outlines, unfold
@@ -167,14 +166,6 @@ def test_true_volume_meets_closed_forms():
     axes = np.array([0.05, 0.04, 0.03])
     egg = Shape("egg", lambda x: 0.03 * (np.linalg.norm(x / axes, axis=1) - 1), (-0.06,) * 3, (0.06,) * 3, 0.004)
     assert true_volume(egg) == pytest.approx(4 / 3 * np.pi * axes.prod(), rel=1e-6)
-
-
-def test_the_second_time_nothing_is_computed(small, monkeypatch):
-    mesh = small["ball"]
-    first = curved(mesh)
-    monkeypatch.setattr(api, "make_curved", lambda *_: pytest.fail("curved again"))
-    again = curved(mesh)
-    assert (again.points == first.points).all() and (again.cells == first.cells).all()
 
 
 def test_a_mesh_that_cannot_follow_its_shape_is_refused():

@@ -5,8 +5,6 @@ import pytest
 
 from studies.base.errors import StudyError
 from studies.geometry import BallRegion, HalfSpace
-from studies.geometry.organs import make_shape
-from studies.geometry.surface.first_surface import first_surface
 from studies.geometry.surface.sheet import check_sheet, sheet_of
 from tests.massspring.conftest import icosphere
 
@@ -40,15 +38,6 @@ def test_a_dent_is_missing_in_the_piece_round_it():
     whole = 4 * np.pi / 3 - 2 * turned
     assert below.share + above.share == pytest.approx(1.0, rel=1e-12, abs=0)
     assert above.share == pytest.approx((over - 2 * turned + dent) / whole, rel=0.02)
-
-
-def test_a_plane_cuts_a_bent_organ_into_two_or_more_pieces():
-    """A plane through both ends of the kidney."""
-    surface = first_surface(make_shape("kidney", {}))
-    counts = [len(sheet_of(plane(0.0, d), *surface).pieces) for d in np.random.default_rng(1).standard_normal((40, 3))]
-    assert min(counts) == 2
-    shares = [sum(p.share for p in sheet_of(plane(0.002 * k, (1, 0, 0)), *surface).pieces) for k in range(-5, 6)]
-    np.testing.assert_allclose(shares, 1.0, rtol=1e-12)
 
 
 @pytest.mark.parametrize(
