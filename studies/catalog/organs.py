@@ -1,7 +1,8 @@
 """Does what holds for ball and liver hold for kidney, spleen, stomach and bladder, solid and hollow?"""
 
 from massspring import Free, ImplicitVolume
-from studies.catalog.study import Chart, Study
+from studies.catalog.study import Study
+from studies.catalog.volume_loss import CHARTS, COLUMNS
 from studies.runs.case import Case
 from studies.runs.recipes import BodyRecipe, SurfaceBody, TetrahedralBody
 from studies.scene.library import BLADDER_FILL, KIDNEY_PROBE, SPLEEN_SAG, STOMACH_PRESS, STOMACH_PROBE
@@ -25,24 +26,7 @@ ORGANS = Study(
         *(case for scene in HOLLOW for case in _cases(scene, TetrahedralBody(), SurfaceBody(axis="centre_line"))),
         *(Case(scene, TetrahedralBody(volumes="whole"), ImplicitVolume()) for scene in HOLLOW),
     ),
-    charts=(
-        Chart("volume.png", "studies.plots.volume_history:draw"),
-        Chart("force.png", "studies.plots.force_path:draw"),
-        Chart("accuracy.png", "studies.plots.accuracy:draw"),
-    ),
-    columns=(
-        "volume_worst",
-        "force_end",
-        "interior_error",
-        "mean_error",
-        "shape_error",
-        "shape_volume",
-        "silhouette_error",
-        "min_j",
-        "force_error",
-        "surface_error",
-        "pressure_error",
-        "lumen_pressure_error",
-    ),
+    charts=CHARTS,
+    columns=(*COLUMNS, "lumen_pressure_error"),
     expects=(Status.INVERTED,),  # the hanging spleen, springs with one volume: docs/accuracy.md
 )

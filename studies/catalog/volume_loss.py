@@ -11,6 +11,24 @@ REPLAYED = (BALL_SQUEEZE, LIVER_PRESS, LIVER_PROBE)
 """The scenes of which all bodies can be seen move (studies.runs.surface_frames)."""
 FINE_STEP = 0.05
 """The headline is repeated at a tenth of the step, so that it is seen not to depend on it."""
+CHARTS = (
+    Chart("volume.png", "studies.plots.volume_history:draw"),
+    Chart("force.png", "studies.plots.force_path:draw"),
+    Chart("accuracy.png", "studies.plots.accuracy:draw"),
+)
+COLUMNS = (
+    "volume_worst",
+    "force_end",
+    "interior_error",
+    "mean_error",
+    "shape_error",
+    "shape_volume",
+    "silhouette_error",
+    "min_j",
+    "force_error",
+    "surface_error",
+    "pressure_error",
+)
 
 VOLUME_LOSS = Study(
     name="volume_loss",
@@ -24,25 +42,7 @@ VOLUME_LOSS = Study(
         ),
         *(Case(BALL_SQUEEZE, body, ImplicitVolume(), dt_fraction=FINE_STEP) for body in (TETRAHEDRAL, SURFACE)),
     ),
-    charts=(
-        Chart("volume.png", "studies.plots.volume_history:draw"),
-        Chart("force.png", "studies.plots.force_path:draw"),
-        Chart("accuracy.png", "studies.plots.accuracy:draw"),
-        Chart("squeeze.png", "studies.plots.squeeze:draw"),
-    ),
-    columns=(
-        "volume_worst",
-        "force_end",
-        "interior_error",
-        "mean_error",
-        "shape_error",
-        "shape_volume",
-        "silhouette_error",
-        "min_j",
-        "force_error",
-        "surface_error",
-        "pressure_error",
-        "volume_end",
-    ),
+    charts=(*CHARTS, Chart("squeeze.png", "studies.plots.squeeze:draw")),
+    columns=(*COLUMNS, "volume_end"),
     main=True,
 )

@@ -156,15 +156,17 @@ def event_of(
 
 def check_virtual(scene: Scene) -> None:
     """Raises DoesNotApply for a scene that virtual nodes cannot cut."""
-    cuts, other = scene.cuts, "take cut 'conforming'"
-    reasons = {
-        f", which has {len(cuts)} cuts; {other}": len(cuts) > 1,
-        ": it has no cut; leave cut out": not cuts,
-        f", whose cut advances; leave until out, or {other}": any(cut.until is not None for cut in cuts),
-        f", whose cut opens a lumen; {other}": any(cut.opens_lumen for cut in cuts),
-        f", whose faces of the cut touch: no node lies on them; {other}": any(cut.contact for cut in cuts),
-    }
-    _refuse(f"virtual nodes do not apply to scene '{scene.name}'", reasons)
+    words = f"virtual nodes do not apply to scene '{scene.name}'"
+    if len(scene.cuts) > 1:
+        raise DoesNotApply(f"{words}, which has {len(scene.cuts)} cuts; take cut 'conforming'")
+    if scene.cut is None:
+        raise DoesNotApply(f"{words}: it has no cut; leave cut out")
+    if scene.cut.until is not None:
+        raise DoesNotApply(f"{words}, whose cut advances; leave until out, or take cut 'conforming'")
+    if scene.cut.opens_lumen:
+        raise DoesNotApply(f"{words}, whose cut opens a lumen; take cut 'conforming'")
+    if scene.cut.contact:
+        raise DoesNotApply(f"{words}, whose faces of the cut touch: no node lies on them; take cut 'conforming'")
 
 
 def opening_of(frame: int, after: Body, triangles: np.ndarray, pairs: np.ndarray) -> Opening:

@@ -150,20 +150,18 @@ def wall_for(scene: Scene, recipe: MembraneBody, mesh: OrganMesh, material: Mate
 def volumes_for(scene: Scene, recipe: BodyRecipe, mesh: OrganMesh, body: Body) -> Volumes | None:
     """The kept volumes of a recipe; None for the tissue as a whole. Raises MassSpringError for volumes that the body
     does not have."""
-    surfaces = {}
-    if isinstance(recipe, TetrahedralBody) and mesh.hollow and scene.filled:
-        if recipe.volumes == "whole":
-            return Volumes.closed_surfaces(body, {WHOLE: mesh.outer_triangles})
-        if recipe.volumes == "scene":
-            return Volumes.closed_surfaces(body, {"wall": mesh.triangles, LUMEN: mesh.lumen_triangles})
-        surfaces = {LUMEN: mesh.lumen_triangles}
+    closed = isinstance(recipe, TetrahedralBody) and mesh.hollow and scene.filled
+    if closed and recipe.volumes == "whole":
+        return Volumes.closed_surfaces(body, {WHOLE: mesh.outer_triangles})
+    if closed and recipe.volumes == "scene":
+        return Volumes.closed_surfaces(body, {"wall": mesh.triangles, LUMEN: mesh.lumen_triangles})
     if recipe.volumes in ("scene", "whole"):
         return None
     if recipe.volumes == "regions":
         tissue = Volumes.regions(body, recipe.regions)
     else:
         tissue = Volumes.nodal(body) if recipe.volumes == "nodal" else Volumes.patches(body)
-    return tissue.joined(Volumes.closed_surfaces(body, surfaces)) if surfaces else tissue
+    return tissue.joined(Volumes.closed_surfaces(body, {LUMEN: mesh.lumen_triangles})) if closed else tissue
 
 
 def targets_for(scene: Scene, mesh: OrganMesh, body: Body) -> dict[str, Ramp]:
