@@ -69,16 +69,11 @@ def is_there(path: Path) -> bool:
 
 def sweep_parts(folder: Path) -> int:
     """Removes the .part files that killed processes left in `folder`; returns how many."""
-    old = old_parts(folder)
+    now = time.time()
+    old = [part for part in Path(folder).glob("*.part") if now - _modified(part) > STALE_SECONDS]
     for part in old:
         _remove(part)
     return len(old)
-
-
-def old_parts(folder: Path) -> list[Path]:
-    """Those files, sorted."""
-    now = time.time()
-    return [part for part in sorted(Path(folder).glob("*.part")) if now - _modified(part) > STALE_SECONDS]
 
 
 def _modified(part: Path) -> float:

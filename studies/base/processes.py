@@ -36,8 +36,6 @@ class Died(Exception):
 
 
 class Message(NamedTuple):
-    """What a process sends while it works."""
-
     text: str
 
 
@@ -69,7 +67,6 @@ class Child:
 
     @property
     def lives(self) -> bool:
-        """Whether the process is there."""
         return self.process.exitcode is None
 
     def give(self, do: Callable[[Any], object], job: Any) -> None:

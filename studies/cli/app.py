@@ -27,7 +27,6 @@ TRACEBACK = "ORGANBENCH_TRACEBACK"
 
 
 def show_version(flag: bool) -> None:
-    """Prints the version and ends."""
     if flag:
         say(f"organbench {studies.__version__}")
         raise typer.Exit
@@ -96,7 +95,6 @@ def message(error: Exception) -> str:
 
 
 def unwritten(error: OSError) -> str:
-    """The sentence for an output that takes no more."""
     return f"the output could not be written ({error.strerror}); stored results are kept"
 
 

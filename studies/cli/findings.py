@@ -12,7 +12,6 @@ from studies.geometry.files.content import LISTED
 
 
 def show(report: Findings) -> None:
-    """Prints the findings, and the numbers behind them."""
     table = Table(show_header=False, box=None, title=report.name, title_justify="left")
     for row in rows_of(report.measures):
         table.add_row(*row)
@@ -28,7 +27,6 @@ def show(report: Findings) -> None:
 
 
 def parts_table(parts: list[dict[str, Any]]) -> Table:
-    """The parts of a file that holds several."""
     table = Table("part", "name", "triangles", "size \\[mm]", box=None, title="parts (--part)", title_justify="left")
     for row in parts[:LISTED]:
         table.add_row(str(row["number"]), Text(row["name"]), f"{row['triangles']:,}", in_mm(row["size"]))
@@ -43,7 +41,6 @@ def in_mm(sides: list[float]) -> str:
 
 
 def rows_of(m: dict[str, Any]) -> list[tuple[str, str]]:
-    """The measures as a person reads them."""
     if m["bad_points"]:
         return [("points", f"{m['points_in_file']:,}")]
     cells = f", {m['tetrahedra']:,} tetrahedra" if "tetrahedra" in m else ""

@@ -29,7 +29,6 @@ def source_of(path: Path, unit: str | None, scale: float, longest_side: str | No
 
 
 def in_metres(millimetres: float | None) -> float | None:
-    """A length of the command line."""
     return None if millimetres is None else millimetres * MM
 
 

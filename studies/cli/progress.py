@@ -56,7 +56,6 @@ class TerminalProgress:
             self.bars.stop()
 
     def begin(self, what: str, total: int) -> None:
-        """A stage of `total` pieces begins."""
         self.totals[what] = [0, total]
         if what in self.tasks:
             self.bars.reset(self.tasks[what], total=total, note=self.left())

@@ -58,12 +58,10 @@ PROGRAM = "FILE.py is a program: run only files you trust"
 
 
 def studies(incomplete: str) -> list[str]:
-    """Names that a shell completes."""
     return [study.name for study in STUDIES if study.name.startswith(incomplete)]
 
 
 def scenes(incomplete: str) -> list[str]:
-    """Names that a shell completes."""
     return [scene.name for scene in (*SCENES, *CUT) if scene.name.startswith(incomplete)]
 
 

@@ -25,7 +25,6 @@ def doctor(results: Results = Path("results")) -> None:
 
 
 def show(finding: Finding) -> None:
-    """A line, and below it how to repair it."""
     say(f"{finding.level:<6} {finding.sentence}")
     if finding.mend:
         say(f"       {finding.mend}")

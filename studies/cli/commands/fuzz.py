@@ -48,5 +48,4 @@ def fuzz(
 
 
 def tell(outcome: Outcome) -> None:
-    """How a trial ended, and the line that repeats it."""
     say(f"{outcome.status}: {outcome.message or 'no fault'} ({outcome.seconds:.2g} s): {outcome.trial.line}")

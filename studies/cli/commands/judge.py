@@ -63,7 +63,6 @@ def judge(
 
 
 def hints_of(run: Run) -> list[str]:
-    """Warnings of probable mistakes in a result that can be judged."""
     hints = [text] if (text := str(run.record.attributes["warnings"])) else []
     error = FORCE(run)
     if error < REVERSED:
@@ -75,7 +74,6 @@ def hints_of(run: Run) -> list[str]:
 
 
 def lines_of(run: Run) -> list[str]:
-    """Each metric with its value and uncertainty."""
     lines, marked = [], False
     for metric in judged_metrics(run.case.scene):
         value = metric(run)

@@ -149,7 +149,6 @@ class Made(NamedTuple):
         return rest_surfaces(curved.points, boundary_facets(mesh, curved.cells))
 
     def errors(self, truth: Organ) -> ShapeErrors:
-        """Of the body against its organ."""
         return shape_errors(truth, self.sides, filled=len(self.mesh.tetrahedra) > 0)
 
 
@@ -214,7 +213,6 @@ def nearness(made: OrganMesh) -> list[str]:
 
 
 def summary(made: Made) -> str:
-    """A line that describes the mesh."""
     mesh, smooth = made
     body = f", {len(mesh.tetrahedra):,} tetrahedra" if len(mesh.tetrahedra) else ""
     angle = f"{float(np.min(dihedral_angles(mesh.points, mesh.tetrahedra))):.3g}" if body else ""

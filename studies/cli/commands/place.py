@@ -88,7 +88,6 @@ def place(
 
 
 def second_body(answer: Advice) -> Recommended | None:
-    """The recommended body, which is printed with its errors."""
     if answer.chosen is None:
         return None
     case, force, displacement = answer.chosen.case, answer.chosen.force, answer.chosen.displacement
@@ -102,8 +101,6 @@ def second_body(answer: Advice) -> Recommended | None:
 
 
 def lines_of(placing: Proposal) -> list[str]:
-    """Where hold and probe are, for a person."""
-
     def mm(values: tuple[float, ...]) -> str:
         return ", ".join(f"{1e3 * x:.4g}" for x in values)
 

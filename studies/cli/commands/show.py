@@ -72,7 +72,6 @@ def show_reasons(found: list[Standing], every: bool) -> None:
 
 
 def show_references(ledger: Ledger, scenes: Iterable[Scene]) -> None:
-    """How the references stand, a line per scene."""
     jobs = reference_jobs(ledger.root, scenes)
     if not jobs:
         return

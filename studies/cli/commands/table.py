@@ -121,13 +121,11 @@ def column(height: int, head: list[str], cells: list[str], justified: Callable[[
 
 
 def values(rows: Sequence[Row], key: str) -> set[str]:
-    """What a setting is in the rows, as it is printed."""
     rows_by_value = {row[key]: row for row in rows}
     return {setting(row, key) for row in rows_by_value.values()}
 
 
 def setting(row: Row, key: str) -> str:
-    """A setting as it is printed."""
     value = row[key]
     if isinstance(value, str):
         return value

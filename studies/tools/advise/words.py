@@ -16,11 +16,8 @@ LABEL = 14
 
 
 def lines_of(answer: Advice) -> list[str]:
-    """An answer in words, line by line."""
     verdict = [f"{answer.scene.name}: {wish_words(answer.wish)}{USUAL if answer.usual else ''}", *_verdict(answer)]
-    if answer.chosen is None:
-        return verdict
-    return [*verdict, *_recipe(answer, answer.chosen)]
+    return verdict if answer.chosen is None else [*verdict, *_recipe(answer, answer.chosen)]
 
 
 USUAL = " (default target; --force and --displacement set another)"
@@ -28,23 +25,14 @@ USUAL = " (default target; --force and --displacement set another)"
 
 def wish_words(wish: Wish) -> str:
     """ "force within 3 %, displacement within 1 %, 1 ms of computing per 1 ms of simulated time"."""
-    parts = [
-        f"{name} within {bound:.3g} %"
-        for name, bound in (("force", wish.force), ("displacement", wish.displacement))
-        if bound is not None
-    ]
+    bounds = {"force": wish.force, "displacement": wish.displacement}
+    parts = [f"{name} within {bound:.3g} %" for name, bound in bounds.items() if bound is not None]
     if wish.budget is not None:
-        parts.append(f"at most {cost_words(wish.budget)}")
+        parts.append(f"at most {wish.budget:.3g} ms of computing per 1 ms of simulated time")
     return ", ".join(parts)
 
 
-def cost_words(cost: float) -> str:
-    """ "0.25 ms of computing per 1 ms of simulated time"."""
-    return f"{cost:.3g} ms of computing per 1 ms of simulated time"
-
-
 def _verdict(answer: Advice) -> list[str]:
-    """Whether the wish is met, and what of it could not be judged."""
     lines = [f"{' and '.join(answer.ignored)} ignored: the scene does not compare it"] if answer.ignored else []
     one, wish = answer.chosen, answer.wish
     if answer.misshapen is not None:
@@ -130,7 +118,6 @@ def _recipe(answer: Advice, one: Judged) -> list[str]:
 
 
 def _meshes(one: Judged, name: str) -> str:
-    """That an error is the largest of several meshes, or of one alone."""
     if not getattr(one, name).known:
         return ""
     if not one.members:

@@ -2,11 +2,10 @@
 
 from dataclasses import dataclass
 from enum import StrEnum
+from functools import partial
 
 
 class Level(StrEnum):
-    """How bad it is."""
-
     OK = "ok"
     NOTE = "note"
     """Something is left out or slower; the rest works."""
@@ -22,16 +21,4 @@ class Finding:
     mend: str = ""
 
 
-def ok(sentence: str) -> Finding:
-    """Nothing to do."""
-    return Finding(Level.OK, sentence)
-
-
-def note(sentence: str, mend: str = "") -> Finding:
-    """Something is left out or slower."""
-    return Finding(Level.NOTE, sentence, mend)
-
-
-def fault(sentence: str, mend: str) -> Finding:
-    """Something that is needed is missing."""
-    return Finding(Level.FAULT, sentence, mend)
+ok, note, fault = (partial(Finding, level) for level in Level)

@@ -31,7 +31,6 @@ def machine(root: Path) -> list[Finding]:
 
 
 def cores() -> Finding:
-    """How many cores this process may use."""
     usable = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     there = os.cpu_count() or 1
     sentence = f"{usable} of {there} cores may be used"
@@ -39,7 +38,6 @@ def cores() -> Finding:
 
 
 def memory(gigabytes: int | None) -> Finding:
-    """Whether two references fit."""
     if gigabytes is None:
         return note("the system does not report its memory")
     if gigabytes >= MEMORY:
@@ -48,7 +46,6 @@ def memory(gigabytes: int | None) -> Finding:
 
 
 def compiler() -> Finding:
-    """Whether kernels are compiled at all."""
     if os.environ.get("NUMBA_DISABLE_JIT", "0") in ("", "0"):
         return ok("kernels are compiled")
     return fault("NUMBA_DISABLE_JIT is set: nothing is compiled, a step takes a thousand times as long", UNCOMPILED)

@@ -59,12 +59,10 @@ def required(extra: str = "") -> list[Requirement]:
 
 
 def extras() -> list[str]:
-    """Extras of the distribution that a user may want."""
     return [name for name in metadata(DISTRIBUTION).get_all("Provides-Extra") or [] if name in PURPOSE]
 
 
 def packages(needed: Sequence[Requirement]) -> Finding:
-    """Whether all required packages are there, in versions that fit."""
     wrong = [(one, what) for one in needed if (what := lacking(one)) is not None]
     if not wrong:
         return ok(f"all {len(needed)} required packages are installed")
@@ -73,14 +71,12 @@ def packages(needed: Sequence[Requirement]) -> Finding:
 
 
 def extra(name: str, needed: Sequence[Requirement]) -> Finding:
-    """Whether an extra is installed."""
     wrong = [one for one in needed if lacking(one) is not None]
     what = f"extra {name}, {PURPOSE[name]}"
     return note(f"{what}: not installed", install(wrong)) if wrong else ok(what)
 
 
 def lacking(one: Requirement) -> str | None:
-    """What is wrong with a package, None when nothing is."""
     try:
         there = version(one.name)
     except PackageNotFoundError:
@@ -89,7 +85,6 @@ def lacking(one: Requirement) -> str | None:
 
 
 def install(needed: Sequence[Requirement]) -> str:
-    """The line that installs packages where organbench runs."""
     names = [shlex.quote(f"{one.name}{one.specifier}") for one in needed]
     return " ".join([shlex.quote(sys.executable), "-m", "pip", "install", *names])
 
@@ -118,7 +113,6 @@ def loads(module: str) -> Finding:
 
 
 def reinstall(package: str) -> str:
-    """The command that reinstalls a package in the version that is there."""
     one = shlex.quote(f"{package}=={version(package)}")
     return f"{shlex.quote(sys.executable)} -m pip install --force-reinstall --no-deps {one}"
 

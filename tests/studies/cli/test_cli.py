@@ -4,7 +4,6 @@ import re
 import sys
 from dataclasses import replace
 
-import h5py
 import numpy as np
 import pandas as pd
 import pytest
@@ -13,7 +12,6 @@ from typer.testing import CliRunner
 from massspring import METHODS
 from studies.catalog import STUDIES
 from studies.cli import app as cli
-from studies.cli import terminal
 from studies.cli.commands.show import SHOWN
 from studies.geometry.organs import SHAPES
 from studies.metrics.metrics import METRICS
@@ -21,7 +19,6 @@ from studies.metrics.table import study_table
 from studies.reference.reference_solves import reference_solves
 from studies.runs.current import case_path
 from studies.scene.library import CUT, SCENES
-from studies.store.paths import index_path
 from studies.store.record import Field, read_record, write_record
 from studies.sweep.load import load_runs
 from tests.studies.tiny import content, diverging_case, tiny_case, tiny_study
@@ -78,12 +75,6 @@ def test_a_run_and_its_report_are_one_command(organbench, tiny_file, results, mo
     assert "tiny: nothing ran" in out and (results / "report.html").is_file()
 
 
-def test_the_index_opens_like_a_tree(organbench, tiny_file, results):
-    assert organbench("run", tiny_file, "--results", results)[0] == 0
-    with h5py.File(index_path(results, "tiny")) as file:
-        assert file[tiny_case().name]["volume"].shape == (5, 1)
-
-
 def test_status_counts_and_says_why(organbench, tiny_file, results):
     path = case_path(results, "tiny", tiny_case())
     write_record(path, replace(read_record(path), fingerprint="0"))
@@ -135,13 +126,6 @@ def test_show_tells_units_status_and_numbers(organbench, results):
     assert code == 0
     for word in ("volume: enclosed volume", "beyond_limit"):
         assert word in whole and word not in out
-
-
-def test_show_goes_on_below_where_the_terminal_is_narrow(organbench, results, monkeypatch):
-    monkeypatch.setattr(terminal.console, "_width", 40)
-    path = case_path(results, "tiny", tiny_case())
-    shown = "".join(organbench("show", path)[1].split())
-    assert path.name in shown
 
 
 def test_table_on_screen_and_as_csv(organbench, tiny_file, results, tmp_path):

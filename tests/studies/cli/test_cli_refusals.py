@@ -43,6 +43,7 @@ REPOSITORY = Path(__file__).parents[3]
         ),
         (("safe-dt", "ball_squeeze", "--body", "solid"), "unknown body 'solid'"),
         (("safe-dt", "ball_squeeze", "--nodes", "-3"), "-3"),
+        (("show", "--results", "none"), "there is no folder none: run `organbench run` first"),
         (("show", "nothing.h5"), "there is no results file nothing.h5"),
         (("replay", "nothing.h5"), "there is no results file nothing.h5"),
         (("run", "nothing.py"), "there is no file nothing.py"),
@@ -93,15 +94,6 @@ def test_a_file_in_the_place_of_the_results_folder(refused, tmp_path):
     for words in (("show",), ("table", "volume_loss"), ("report", "volume_loss"), ("advise", "ball_squeeze")):
         assert "is a file" in refused(*words, "--results", tmp_path / "afile")
     assert "is a file" in refused("run", "volume_loss", "--dry-run", "--results", os.devnull)
-
-
-def test_status_of_a_folder_that_is_missing(refused, tmp_path):
-    assert f"there is no folder {tmp_path / 'none'}" in refused("show", "--results", tmp_path / "none")
-
-
-def test_the_table_of_a_study_of_which_nothing_is_stored_is_not_written(refused, tmp_path):
-    refused("table", "volume_loss", "--results", tmp_path, "--csv", tmp_path / "x.csv")
-    assert list(tmp_path.iterdir()) == []
 
 
 def test_a_study_of_which_nothing_is_stored_is_not_drawn(refused, tmp_path):
@@ -204,3 +196,18 @@ def test_from_the_shell(tmp_path):
         )
         assert done.returncode == code
         assert len(done.stderr.splitlines()) == (1 if code else 0)
+
+
+def test_lines_that_the_output_does_not_take_at_the_end_are_bad_input(monkeypatch, capsys):
+    """Short output waits in the buffer until the program ends."""
+
+    class Full(io.StringIO):
+        def flush(self):
+            raise OSError(errno.ENOSPC, "No space left on device")
+
+        def fileno(self):
+            return os.open(os.devnull, os.O_WRONLY)
+
+    monkeypatch.setattr(sys, "stdout", Full())
+    assert cli.flushed(0) == 2 and "could not be written" in capsys.readouterr().err
+    assert cli.flushed(1) == 1

@@ -12,7 +12,6 @@ from studies.geometry.api import advice
 from studies.geometry.doctor.examine import examine
 from studies.geometry.files.units import Source
 from tests.studies.geometry.boxes import box, split, together
-from tests.studies.geometry.real import real_surface
 
 EGG = split(*box((-1, -1, -1), (1, 1, 1)), times=3)
 POINTS = EGG[0] / np.linalg.norm(EGG[0], axis=1, keepdims=True) * (30, 25, 20)
@@ -101,18 +100,6 @@ def test_the_command_takes_the_file_as_it_was_taken(tmp_path):
     ):
         parts = shlex.split(advice.command(source, {"smooth": 0.003}))
         assert parts[4 : 4 + len(words)] == words and parts[4 + len(words) :][:4] == ["--nodes", "550", "--smooth", "3"]
-
-
-@pytest.mark.campaign
-def test_a_real_organ_with_a_hole_and_turned_triangles(organbench, tmp_path, monkeypatch):
-    raw = meshio.read(real_surface("spleen_hra_550"))
-    faces = raw.cells_dict["triangle"].copy()
-    faces[:200] = faces[:200, ::-1]
-    monkeypatch.chdir(tmp_path)
-    stored(tmp_path / "spleen.ply", raw.points, faces[5:])
-    code, out, _ = organbench("mesh", "--check", "spleen.ply")
-    assert code == 1 and TRIED in out
-    assert organbench(*shlex.split(out.splitlines()[-1])[1:])[0] == 0
 
 
 def test_what_is_left_is_named(monkeypatch, tmp_path):
