@@ -3,6 +3,7 @@
 from typing import Any
 
 from massspring import Plane, Sphere, Trajectory
+from studies.base.errors import StudyError
 from studies.geometry.organs import make_shape
 from studies.geometry.shape.levelset import PalpationPoint
 from studies.scene.placing import Vector, along, press_times, scaled
@@ -27,8 +28,10 @@ def probed(
 
 def pressed(organ: str, title: str, at: Vector, depth: float, seconds: tuple[float, float], **more: Any) -> Scene:
     """ORGAN_press: a frictionless plane moves from a point by `depth` along the organ's direction of press [m];
-    `seconds` and `more` as in `loaded`."""
+    `seconds` and `more` as in `loaded`. Raises StudyError for an organ without such a direction."""
     inward = make_shape(organ, {}).press
+    if inward is None:
+        raise StudyError(f"the shape '{organ}' names no direction of press; choose another organ")
     plane = Plane(at, inward, moved(scaled(inward, depth), seconds[0]))
     return _touched(f"{organ}_press", organ, title, plane, inward, seconds, **more)
 
@@ -66,7 +69,7 @@ def loaded(name: str, organ: str | Organ, title: str, seconds: tuple[float, floa
 
     more: other fields of Scene, and those of these that differ.
     """
-    usual = {
+    usual: dict[str, Any] = {
         "organ": Organ(organ) if isinstance(organ, str) else organ,
         "duration": seconds[1],
         "checkpoints": press_times(0.0, seconds[0], STEPS, seconds[1]),

@@ -1,8 +1,10 @@
 """A scene and a recipe's text of a table give the case again."""
 
+import json
+
 import pytest
 
-from massspring import Free, Xpbd
+from massspring import Free, ImplicitVolume, Xpbd
 from studies.base.errors import StudyError
 from studies.catalog import STUDIES
 from studies.runs.case import Case
@@ -19,6 +21,9 @@ def test_every_case_of_the_catalogue_comes_back(study):
 
 def test_only_what_was_chosen_is_named():
     assert recipe_text(Case(LIVER_PRESS)) == "{}"
+    # As published tables have it: without a setting that came later and has its default.
+    chosen = recipe_text(Case(LIVER_PRESS, method=ImplicitVolume(most_iterations=9)))
+    assert json.loads(chosen)["method"]["settings"] == {"tolerance": 1e-6, "most_iterations": 9}
     case = Case(LIVER_PRESS, QuadraticBody(794), dt_fraction=0.8)
     assert recipe_text(case) == '{"body": {"kind": "quadratic", "nodes": 794}, "dt_fraction": 0.8}'
 

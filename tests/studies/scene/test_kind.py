@@ -48,6 +48,7 @@ def test_a_rod_probes_and_a_plane_squeezes_what_nothing_holds():
     one = (Plane((0.0, 0.0, 0.1), (0.0, 0.0, -1.0), DOWN),)
     assert kind_of(replace(BALL_SQUEEZE, obstacles=one)).load == "squeeze"
     assert kind_of(replace(KIDNEY_PROBE, obstacles=one)).load == "press"
+    assert kind_of(replace(KIDNEY_PROBE, obstacles=one + one)).load == "squeeze"
 
 
 def test_a_lumen_that_grows_is_filled_and_a_wall_makes_hollow():
