@@ -116,7 +116,7 @@ def published_rows(published: Path, scene: Scene) -> list[Judged]:
         if isinstance(error, StudyError):
             raise
         raise StudyError(
-            f"{path} cannot be read ({error}); `organbench run {ACCURACY.name}` and `organbench publish` rewrite it"
+            f"{path} cannot be read ({error}); delete it, and the table that comes with the program counts"
         ) from error
 
 
