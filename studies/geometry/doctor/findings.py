@@ -80,7 +80,7 @@ RULES: tuple[tuple[str, str | Callable[[Measures], int], str | Callable[[Measure
     ),
     (
         "small",
-        lambda m: m["unit_said"] and m.get("closed") and 0 < abs(m["volume"]) < LEAST_VOLUME,
+        lambda m: bool(m["unit_said"] and m.get("closed") and 0 < abs(m["volume"]) < LEAST_VOLUME),
         lambda m: f"it encloses {1e6 * abs(m['volume']):.2g} mL, and no organ is smaller than 1 mL",
         "give another --unit, or choose another --part",
     ),
@@ -122,7 +122,7 @@ RULES: tuple[tuple[str, str | Callable[[Measures], int], str | Callable[[Measure
     ),
     (
         "shell",
-        lambda m: m.get("closed") and 0 < m["thickness"] < SHELL * m["diagonal"],
+        lambda m: bool(m.get("closed") and 0 < m["thickness"] < SHELL * m["diagonal"]),
         lambda m: (
             f"it is a thin shell, {1e3 * m['thickness']:.2g} mm thick (2 V / A) on {1e3 * m['diagonal']:.3g} mm: "
             "a capsule or a double wall, and no body"
@@ -208,7 +208,7 @@ def findings_of(measures: Measures) -> tuple[Finding, ...]:
     """All findings from the measures, in the order of RULES."""
     found = []
     for code, count, sentence, mend in RULES:
-        times = int(measures.get(count) or 0) if isinstance(count, str) else int(count(measures) or 0)
+        times = int(measures.get(count) or 0) if isinstance(count, str) else int(count(measures))
         if times:
             said = sentence.format_map(measures) if isinstance(sentence, str) else sentence(measures)
             found.append(Finding(code, times, said, mend))
