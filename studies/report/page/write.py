@@ -1,4 +1,4 @@
-"""report.html: findings, one case, charts and the table of a results folder in one file of at most LIMIT bytes.
+"""report.html: recommended bodies, a case, charts and the table of a results folder in one file of at most LIMIT bytes.
 
 Cases for which it has no room are in FOLDER next to it, a file each, which the page loads when a case is opened.
 """
@@ -20,7 +20,6 @@ from studies.base.errors import StudyError
 from studies.catalog.study import Study, command_line
 from studies.report.page.best import HEADS, answers, joined_best, own_first, scene_rows
 from studies.report.page.case_data import merged
-from studies.report.page.findings import findings
 from studies.report.page.markup import ASSETS, TEMPLATES, machine_words, script_json, table, tabs
 from studies.report.page.part import Part, other_studies, part_path, read_part, results_option
 
@@ -170,7 +169,6 @@ def page(
     """The file. data: what its script reads; options: of the commands that make it again."""
     rows = [{"study": study.name, **row} for study, part in parts for row in part["rows"]]
     case_rows = joined_rows(rows)
-    tables = {study.name: part["rows"] for study, part in parts}
     names = [study.name for study, _ in parts]
     script = "\n".join((ASSETS / name).read_text(encoding="utf-8") for name in SCRIPTS)
     studies = [study for study, _ in parts]
@@ -184,7 +182,6 @@ def page(
         answers=answers(best, own),
         best_heads=HEADS,
         best_rows=scene_rows(best),
-        findings=findings(tables),
         tabs=tabs(
             {study.name: part["charts"] for study, part in parts},
             {study.name: " ".join(study.question.split()) for study in studies},
