@@ -45,7 +45,7 @@ def copy_pages() -> list:
     shutil.rmtree(STAGE, ignore_errors=True)
     shutil.copytree(ROOT / "docs", STAGE / "docs", ignore=shutil.ignore_patterns("site"))
     shutil.copytree(SITE / "assets", STAGE / "assets")
-    for file in ("README.md", "CONTRIBUTING.md", "SECURITY.md", "CHANGELOG.md", "LICENSE"):
+    for file in ("README.md", "CONTRIBUTING.md", "SECURITY.md", "CHANGELOG.md", "LICENSE", "CITATION.cff"):
         shutil.copy(ROOT / file, STAGE / file)
     for page in STAGE.rglob("*.md"):
         for shown in LINK.findall(page.read_text(encoding="utf-8")):

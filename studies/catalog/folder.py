@@ -9,6 +9,7 @@ import studies.geometry as geometry
 from massspring import Sphere, Trajectory
 from studies.base.errors import StudyError
 from studies.catalog.study import Study
+from studies.geometry.files.formats import ENDINGS
 from studies.geometry.files.units import Source, check_unit, stem_of
 from studies.scene.chosen_place import DEPTH, RADIUS
 from studies.scene.kind import has_wall
@@ -19,11 +20,6 @@ from studies.scene.scene_file import python_name
 from studies.scene.tissues import LIVER, Tissue
 from studies.store.paths import readable
 
-SURFACES = (
-    *(".stl", ".ply", ".obj", ".off", ".vtk", ".vtp", ".vtu", ".msh"),
-    *(".glb", ".gltf", ".nii", ".nii.gz", ".nrrd"),
-)
-"""Endings of the files that are read."""
 NODES = 550
 """Of the mesh on which hold and probe are placed."""
 DURATION, DAMPING = 8.0, 8.0
@@ -52,10 +48,10 @@ def placed_organs(folder: Path, unit: str | None = None) -> Iterator[Placed]:
     unit: of files that do not state one. Raises StudyError for a folder that does not exist, or holds no surface.
     """
     if not folder.is_dir():
-        raise StudyError(f"there is no folder {folder}; give one with surfaces ({', '.join(SURFACES)})")
-    files = sorted(path for path in folder.iterdir() if path.is_file() and path.name.lower().endswith(SURFACES))
+        raise StudyError(f"there is no folder {folder}; give one with surfaces ({', '.join(ENDINGS)})")
+    files = sorted(path for path in folder.iterdir() if path.is_file() and path.name.lower().endswith(ENDINGS))
     if not files:
-        raise StudyError(f"{folder} has no surface; supported formats are {', '.join(SURFACES)}")
+        raise StudyError(f"{folder} has no surface; supported formats are {', '.join(ENDINGS)}")
     names = dict[str, int]()
     for path in files:
         name = python_name(stem_of(path))

@@ -25,6 +25,7 @@ from studies.reference.load import reference_for
 from studies.runs.case import Case
 from studies.runs.indicators import sway
 from studies.runs.prepare import LUMEN
+from studies.runs.status import inversion
 from studies.scene.scene import Scene
 from studies.store.record import Record, Status, new_fields, new_record, write_record
 from studies.store.schema import RUN_FIELDS
@@ -86,12 +87,11 @@ def entry_record(
             raise StudyError(f"{handed.name} already has the force; leave out {force.name}")
         fitting.histories["force"] = force_at(force.name, fitting.t, *read_force(force), scene)
     values = measured(fitting)
-    inverted = values["min_j"][-1] <= 0.0
     digest = hashlib.sha256(np.ascontiguousarray(fitting.positions).tobytes()).hexdigest()
     about = {ENTRY: f"{path.name} sha256:{digest}", SECONDS: seconds}
     if "force" in fitting.histories:  # how much it varies at the end
         about["sway"] = sway(scene, values["t"], values["contact_force"], values["held_force"])
-    status, message = (Status.INVERTED, "an element is inverted at the end") if inverted else (Status.OK, "")
+    status, message = inversion(values["min_j"])
     return _record(Case(scene, fitting.mesh.recipe, method), status, message, _attributes(fitting) | about, values)
 
 

@@ -8,7 +8,7 @@ from .api.organs import organ as organ
 from .api.scans import painted as painted
 from .api.scans import scan as scan
 from .api.scans import true_shape_of as true_shape_of
-from .files.reading import read_mesh as read_mesh
+from .files.checked_reading import read_mesh as read_mesh
 from .mesh.checks import check_surface as check_surface
 from .mesh.checks import check_tetrahedra as check_tetrahedra
 from .mesh.organ_mesh import OrganMesh as OrganMesh

@@ -54,9 +54,12 @@ def figure(runs: Sequence[Run]) -> Figure:
         for probe in scene.obstacles:
             if isinstance(probe, Sphere):
                 middle = CAMERA.see(np.asarray(probe.centre) + probe.path(scene.checkpoints[-1]))
-                panel.add_patch(Circle(middle[:2], probe.radius, facecolor=GLASS, edgecolor=GREY, alpha=0.5))
+                panel.add_patch(
+                    Circle((middle[0], middle[1]), probe.radius, facecolor=GLASS, edgecolor=GREY, alpha=0.5)
+                )
         frame(panel, window.min(axis=0) - MARGIN, window.max(axis=0) + MARGIN)
-    scale_bar(axes[0], *(window.min(axis=0) - MARGIN / 2), 0.05, "50 mm", size=SMALL)
+    left, below = window.min(axis=0) - MARGIN / 2
+    scale_bar(axes[0], left, below, 0.05, "50 mm", size=SMALL)
     bar = sheet.colorbar(ScalarMappable(scale, COLOURS), ax=list(axes), shrink=0.6, pad=0.01)
     bar.set_label("displacement [mm]")
     sizes = ", ".join(f"{run.case.body.nodes:,}" for run in shown)

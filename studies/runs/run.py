@@ -21,6 +21,7 @@ from studies.runs.cutting import LUMEN
 from studies.runs.indicators import indicators, remarks
 from studies.runs.limits import TIME_LIMIT
 from studies.runs.prepare import Prepared, prepare
+from studies.runs.status import status_of
 from studies.runs.surface_frames import moments, surface_fields
 from studies.runs.user_code import fault_of, files_of
 from studies.store.record import Field, Record, Status, new_fields, new_record, read_record, write_record
@@ -28,9 +29,6 @@ from studies.store.schema import RUN_FIELDS
 
 OWN_FILES = "own_files"
 """Attribute of a run: the user's files that it was made with, as JSON {path: SHA-256}."""
-DRIFT = 0.01
-"""Relative volume error beyond which a method that keeps the volume has status "drifted": thirty times the error that
-the weakest claim allows."""
 
 
 def run_case(root: Path, study: str, case: Case, on_frame: Callable[[int], object] | None = None) -> Path:
@@ -64,7 +62,7 @@ def measure(case: Case, on_frame: Callable[[int], object] | None = None) -> Reco
             if own is None:
                 raise
             return _record(case, Status.FAILED, own, {"warnings": _warning_text(caught)}, {})
-    status, message = judge(case, prepared, history)
+    status, message = status_of(case, history)
     signs = indicators(case.scene, prepared.body, history, _lumen_column(prepared))
     text = "; ".join(filter(None, [_warning_text(caught), *remarks(signs)]))
     attributes = {**_attributes(prepared, history), **signs, "warnings": text}
@@ -86,24 +84,6 @@ def snapshot_frames(case: Case, prepared: Prepared) -> list[int]:
     recorded."""
     at = checkpoint_frames(case, prepared)
     return moments(prepared.setup.clock.frames, at) if "surface" in case.recorded else at
-
-
-def judge(case: Case, prepared: Prepared, history: History) -> tuple[Status, str]:
-    """The status of the run, and a sentence on the reason."""
-    if history.outcome != "finished":
-        return Status(history.outcome), history.message
-    smallest = float(history.min_j[-1])
-    if smallest <= 0:
-        return Status.INVERTED, f"an element is inverted at the end (smallest volume ratio {smallest:.3g})"
-    # For a body that starts with a volume error only the final volume counts.
-    since = 0 if case.scene.start is None else -1
-    drift = float(np.max(np.abs(history.volume[since:] / history.volume_target[since:] - 1)))
-    if case.method.volume_tol is not None and drift > DRIFT:
-        return (
-            Status.DRIFTED,
-            f"volume error {100 * drift:.3g} % (allowed: {100 * DRIFT:g} %)",
-        )
-    return Status.OK, ""
 
 
 def _record(case: Case, status: Status, message: str, attributes: dict, fields: dict[str, Field]) -> Record:

@@ -4,6 +4,7 @@ from typing import Any
 
 from massspring import Plane, Sphere, Trajectory
 from studies.base.errors import StudyError
+from studies.base.lookup import lookup
 from studies.geometry.organs import make_shape
 from studies.geometry.shape.levelset import PalpationPoint
 from studies.scene.placing import Vector, along, press_times, scaled
@@ -76,7 +77,7 @@ def loaded(name: str, organ: str | Organ, title: str, seconds: tuple[float, floa
         "reference": ReferencePlan(),
     }
     if isinstance(organ, str):
-        usual["tissue"] = TISSUES[organ]
+        usual["tissue"] = lookup(organ, TISSUES, "tissue of an organ")
     return Scene(name=name, title=title, **(usual | more))
 
 

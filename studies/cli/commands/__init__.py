@@ -1,1 +1,1 @@
-"""Commands, one per module; studies.cli.groups loads the one that is called."""
+"""Commands, one per module. Adding one: a file here, and a line in `GROUPS` (studies.cli.groups)."""

@@ -96,5 +96,5 @@ def command(source: Source, how: dict[str, Any]) -> str:
     side = None if source.longest_side is None else f"{source.longest_side:g}m"
     scale = None if source.scale == 1.0 else f"{source.scale:g}"
     given = {"--unit": source.unit, "--scale": scale, "--longest-side": side, "--part": source.part}
-    words += [word for pair in given.items() if pair[1] is not None for word in pair]
+    words += [word for option, value in given.items() if value is not None for word in (option, value)]
     return shlex.join([*words, *options(how).split(), "-o", f"{stem_of(source.path)}_body.vtu"])

@@ -11,9 +11,9 @@ import numpy as np
 from studies.base.errors import StudyError
 from studies.geometry.api.organs import attach
 from studies.geometry.api.organs import fill as fill_mesh
+from studies.geometry.files.checked_reading import marked_nodes, weld, with_patches
 from studies.geometry.files.content import Content
-from studies.geometry.files.opening import opened
-from studies.geometry.files.reading import marked_nodes, weld, with_patches
+from studies.geometry.files.formats import opened
 from studies.geometry.files.units import (
     FAR_AWAY,
     LARGEST,

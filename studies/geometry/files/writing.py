@@ -11,7 +11,7 @@ import numpy as np
 
 from studies.base.atomic import write_whole
 from studies.base.errors import StudyError
-from studies.geometry.files.reading import PATCH
+from studies.geometry.files.checked_reading import PATCH
 from studies.geometry.files.units import UNITS, check_unit
 from studies.geometry.mesh.organ_mesh import OrganMesh
 from studies.geometry.mesh.second_order import CurvedMesh

@@ -26,6 +26,8 @@ from studies.base.processes import run_each
 from studies.sweep.compiling import elements, frames
 
 PROCESSES = 2
+OWN_NAME = "studies.sweep.compiling.main"
+"""Of this module, also where it is the program."""
 ESSENTIAL: tuple[str, ...] = (
     "implicit_volume, whole, float64",
     "free, whole, float64",
@@ -56,7 +58,7 @@ def tasks() -> dict[str, Callable[[], None]]:
 def stamp(whole: bool) -> Path:
     """The file that is there when the whole is compiled, or what is essential: one for each state of the code, of the
     compiler and kind of processor."""
-    state = [source_fingerprint(__name__), platform.python_version(), llvm.get_host_cpu_name()]
+    state = [source_fingerprint(OWN_NAME), platform.python_version(), llvm.get_host_cpu_name()]
     state += [version(package) for package in ("numba", "llvmlite", "numpy")]
     key = hashlib.sha256("\0".join(state).encode()).hexdigest()[:16]
     return folder() / f"{'complete' if whole else 'essential'}-{key}"

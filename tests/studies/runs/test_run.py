@@ -12,7 +12,8 @@ from studies.runs import run as module
 from studies.runs.case import Case
 from studies.runs.prepare import prepare
 from studies.runs.recipes import SurfaceBody, TetrahedralBody
-from studies.runs.run import checkpoint_frames, judge, measure, replay, run_case
+from studies.runs.run import checkpoint_frames, measure, replay, run_case
+from studies.runs.status import status_of
 from studies.scene.library.stress import STRESS_SCENES
 from studies.store.record import Field, Status, read_record, write_record
 from tests.studies.tiny import FRAMES, NODES, diverging_case, tiny_case
@@ -121,8 +122,8 @@ def test_out_of_time(monkeypatch):
 
 @pytest.mark.parametrize(("smallest", "status"), [(0.1, Status.OK), (0.0, Status.INVERTED), (-0.3, Status.INVERTED)])
 def test_ending_inside_out(ended, smallest, status):
-    case, prepared, history = ended
-    verdict, message = judge(case, prepared, replace(history, min_j=np.append(history.min_j[:-1], smallest)))
+    case, _, history = ended
+    verdict, message = status_of(case, replace(history, min_j=np.append(history.min_j[:-1], smallest)))
     assert verdict == status
     assert ("inverted at the end" in message) == (status == Status.INVERTED)
 
@@ -132,11 +133,11 @@ def test_a_kept_volume_that_was_not_kept(ended, off, status):
     case, prepared, history = ended
     volume = history.volume.copy()
     volume[2] = (1 + off) * prepared.setup.body.volume
-    verdict, message = judge(case, prepared, replace(history, volume=volume))
+    verdict, message = status_of(case, replace(history, volume=volume))
     assert verdict == status
     assert (f"volume error {100 * abs(off):.3g} %" in message) == (status == Status.DRIFTED)
     # A method that claims no volume cannot break the claim.
-    assert judge(case.replaced(method=Free()), prepared, replace(history, volume=volume))[0] == Status.OK
+    assert status_of(case.replaced(method=Free()), replace(history, volume=volume))[0] == Status.OK
 
 
 def test_replay_is_equal_bit_for_bit(ran):

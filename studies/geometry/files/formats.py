@@ -1,4 +1,7 @@
-"""Reads the content of a mesh file of any supported format, or raises an error with the reason."""
+"""Reads the content of a mesh file of any supported format, or raises an error with the reason.
+
+Adding a format: its ending in `ENDINGS`, its reader in `read`, its name in `FORMATS` (studies.geometry.files.faults).
+"""
 
 import contextlib
 import io
@@ -18,6 +21,8 @@ from studies.geometry.files.units import Source
 from studies.geometry.files.vtk_files import as_grid, is_legacy_polydata, read_legacy, with_arrays
 
 OBJECTS = (".off", ".obj", ".glb", ".gltf")
+ENDINGS = (*(".stl", ".ply", ".vtk", ".vtp", ".vtu", ".msh", ".nii", ".nii.gz", ".nrrd"), *OBJECTS)
+"""Of the files of a folder that are taken for surfaces; a file that is named may have another one of meshio's."""
 
 
 def opened(source: Source) -> Content:
