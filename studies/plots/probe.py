@@ -54,9 +54,8 @@ def figure(runs: Sequence[Run]) -> Figure:
         for probe in scene.obstacles:
             if isinstance(probe, Sphere):
                 middle = CAMERA.see(np.asarray(probe.centre) + probe.path(scene.checkpoints[-1]))
-                panel.add_patch(
-                    Circle((middle[0], middle[1]), probe.radius, facecolor=GLASS, edgecolor=GREY, alpha=0.5)
-                )
+                ball = Circle((middle[0], middle[1]), probe.radius, facecolor=GLASS, edgecolor=GREY, alpha=0.5)
+                panel.add_patch(ball)
         frame(panel, window.min(axis=0) - MARGIN, window.max(axis=0) + MARGIN)
     left, below = window.min(axis=0) - MARGIN / 2
     scale_bar(axes[0], left, below, 0.05, "50 mm", size=SMALL)
