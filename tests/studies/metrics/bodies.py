@@ -7,18 +7,10 @@ import numpy as np
 from massspring import Body
 from studies.metrics.run import Run
 from studies.runs.case import Case
-from studies.runs.prepare import prepare
-from studies.runs.recipes import BODIES, BodyRecipe, QuadraticBody
+from studies.runs.recipes import BODIES, BodyRecipe
 from studies.scene.library.ball_clamped import BALL_CLAMPED
-from studies.scene.library.liver_press import LIVER_PRESS
 from studies.scene.scene import Organ, Scene
 from tests.studies import made_up_run
-
-LIVER = QuadraticBody(794, graded=True, mass="stiffness")
-"""The body that was recommended for liver_press when it lacked 26 mm of the left lobe."""
-
-COARSE = QuadraticBody(594, mass="stiffness")
-"""Meshed in seconds."""
 
 
 def rest_run(scene: Scene, recipe: BodyRecipe, body: Body, rest: np.ndarray | None = None) -> Run:
@@ -39,12 +31,3 @@ def ball_run(body: Body, rest: np.ndarray | None = None, kind: str = "quadratic"
     """Such a run whose organ is a ball."""
     scene = replace(BALL_CLAMPED, organ=Organ("ball", {"radius": radius}))
     return rest_run(scene, BODIES[kind](), body, rest)
-
-
-def liver_runs(*stretches: tuple[float, float, float]) -> list[Run]:
-    """A coarse body of the liver, stretched about its middle along each axis, in the place of the recommended one."""
-    body = prepare(Case(LIVER_PRESS, COARSE)).setup.body
-    middle = 0.5 * (body.rest.min(axis=0) + body.rest.max(axis=0))
-    return [
-        rest_run(LIVER_PRESS, LIVER, body, middle + np.array(stretch) * (body.rest - middle)) for stretch in stretches
-    ]

@@ -71,16 +71,13 @@ def test_the_larger_floor_of_both_counts(tmp_path):
 
 
 @pytest.mark.parametrize("old", [{}, {"reference": "2027.1 0a0a0a0a"}])
-def test_errors_against_two_references_are_not_judged(tmp_path, organbench, old):
+def test_errors_against_two_references_are_not_judged(tmp_path, old):
     """The force moved by ten times its uncertainty, but its reference differs; a number without a reference moved."""
     before = folder(tmp_path / "old", rows(**old))
     new = {"reference": "2027.2 0b0b0b0b", "force_end [%]": -25.0, "min_j [1]": 0.5}
     comparison = compare(before, folder(tmp_path / "new", rows(**new)))
     assert Verdict.MOVED not in verdicts_of(comparison) and Verdict.OTHER_REFERENCE in verdicts_of(comparison)
     assert Verdict.OTHER_REFERENCE not in verdicts_of(comparison, "min_j")
-    code, out, _ = organbench("compare", before, tmp_path / "new")
-    assert code == 0
-    assert "references: not the same in both folders, " in out
 
 
 def test_records_are_compared_to_the_last_bit(results, tmp_path):
@@ -98,43 +95,24 @@ def test_records_are_compared_to_the_last_bit(results, tmp_path):
     assert len(equal_records(results, other, "tiny")) == len(before) - 1
 
 
-def without(path):
-    return path / "nowhere"
-
-
-def empty(path):
-    (path / "empty").mkdir()
-    return path / "empty"
-
-
-def no_recipes(path):
-    return folder(path / "old", [{"a": 1}])
-
-
-def other_study(path):
-    return folder(path / "old", rows(), study="another")
-
-
-def no_table(path):
-    made = folder(path / "old", rows())
+def spoilt(path):
+    made = folder(path, rows())
     (made / "made_up" / "made_up.csv").write_bytes(b"")
     return made
 
 
-@pytest.mark.parametrize(
-    ("make", "sentence"),
-    [
-        (without, "there is no folder"),
-        (empty, "holds no table of a study"),
-        (no_recipes, "holds no table of a study"),
-        (other_study, "have no case in common"),
-        (no_table, "cannot be read as a table"),
-    ],
-)
-def test_folders_that_cannot_be_compared_are_refused_in_a_sentence(tmp_path, make, sentence):
-    new = folder(tmp_path / "new", rows())
+REFUSED = {
+    "there is no folder": lambda path: path / "nowhere",
+    "holds no table of a study": lambda path: folder(path, [{"a": 1}]),
+    "have no case in common": lambda path: folder(path, rows(), study="another"),
+    "cannot be read as a table": spoilt,
+}
+
+
+@pytest.mark.parametrize("sentence", REFUSED)
+def test_folders_that_cannot_be_compared_are_refused_in_a_sentence(tmp_path, sentence):
     with pytest.raises(StudyError, match=sentence):
-        compare(make(tmp_path), new)
+        compare(REFUSED[sentence](tmp_path / "old"), folder(tmp_path / "new", rows()))
 
 
 TIMED = {"nodes": 550, "step_time [µs]": 20.0, "step_time floor [µs]": 0.5, "real_time [s/s]": 8.0}
@@ -148,7 +126,7 @@ def timed(path, machine, **changes):
     return made
 
 
-@pytest.mark.parametrize("machines", [("one", "other"), ("one", ""), ("", ""), ("one", "one")])
+@pytest.mark.parametrize("machines", [("one", "other"), ("", ""), ("one", "one")])
 def test_times_are_judged_on_one_machine_alone(tmp_path, organbench, machines):
     old, new = timed(tmp_path / "old", machines[0]), timed(tmp_path / "new", machines[1], **SLOW)
     comparison, same = compare(old, new), machines == ("one", "one")
@@ -158,37 +136,15 @@ def test_times_are_judged_on_one_machine_alone(tmp_path, organbench, machines):
         "real_time": Verdict.NOT_RESOLVABLE if same else Verdict.OTHER_MACHINE,
     }
     code, out, _ = organbench("compare", old, new)
-    assert code == same and out.startswith("accuracy: 4 equal, 0 within uncertainty, 0 moved\nspeed: ")
-    if not same:
-        machine = "another machine" if all(machines) else "machine not known"
-        assert f"speed: {machine}, median ratio 1.5 (new / old), 4 times not judged" in out
+    assert code == same and ("median ratio 1.5 (new / old), 4 times not judged" in out) != same
 
 
-def test_accuracy_that_moves_ends_with_one_on_any_machine_and_comes_first(tmp_path, organbench):
-    worse = SLOW | {"force_end [%]": -31.0}
-    old = timed(tmp_path / "old", "one")
-    assert organbench("compare", old, timed(tmp_path / "other", "other", **worse))[0] == 1
-    comparison = compare(old, timed(tmp_path / "same", "one", **dict(reversed(worse.items()))))
-    assert [change.metric for change in comparison.moved] == ["force_end", "step_time"]
-
-
-def test_no_two_rows_are_equal_and_they_name_the_nodes(tmp_path):
-    more = {"nodes": 300, "law": "lloyd", "recipe": "{1}"}
-    first = rows()[0] | {"law": "uniform", "dt/dt_c": 0.5}
-    table = [
-        first | {"nodes": 550},
-        first | {"nodes": 300},
-        first | more,
-        first | more | {"dt/dt_c": 0.05, "recipe": "{2}"},
-    ]
-    table = [row | {"recipe": f"{{{number}}}"} for number, row in enumerate(table)]
-    moved = [row | {"force_end [%]": -40.0} for row in table]
-    comparison = compare(folder(tmp_path / "old", table), folder(tmp_path / "new", moved))
-    assert [row[2] for row in rows_of(comparison.moved, comparison)] == [
-        "surface, 550, free",
-        "surface, 300, free, uniform, step 0.5",
-        "surface, 300, free, lloyd, step 0.5",
-        "surface, 300, free, lloyd, step 0.05",
+def test_accuracy_that_moves_comes_before_times(tmp_path):
+    worse = timed(tmp_path / "same", "one", **{"force_end [%]": -31.0}, **SLOW)
+    moved = compare(timed(tmp_path / "old", "one"), worse).moved
+    assert [change.metric for change in moved] == [
+        "force_end",
+        "step_time",
     ]
 
 

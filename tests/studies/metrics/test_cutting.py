@@ -27,12 +27,7 @@ def cut_run(volume, **changes) -> dict:
     return {"scene": CUT, "values": values, "attributes": attributes}
 
 
-def test_pieces_on_their_way_are_exact():
-    for name in ("piece_worst", "piece_sum_worst"):
-        assert of(name, **cut_run(TARGET)) == pytest.approx(0.0, abs=1e-12)
-
-
-@pytest.mark.parametrize(("frame", "error"), [(0, 0.0), (1, 0.0), (2, 0.5), (3, 0.5)])
+@pytest.mark.parametrize(("frame", "error"), [(1, 0.0), (2, 0.5), (3, 0.5)])
 def test_a_piece_is_judged_once_its_clock_has_run_out_even_if_the_sum_is_right(frame, error):
     """The small one half a per cent too large, what it has too much missing in the large one."""
     volume = TARGET.copy()
@@ -41,15 +36,17 @@ def test_a_piece_is_judged_once_its_clock_has_run_out_even_if_the_sum_is_right(f
     assert of("piece_sum_worst", **cut_run(volume)) == pytest.approx(0.0, abs=1e-9)
 
 
-def test_a_run_that_ended_before_its_cut_has_no_worst_piece():
-    """From there on its record holds no numbers."""
-    nothing = np.where(np.arange(4)[:, None] < 1, TARGET, np.nan)
-    run = cut_run(nothing)
+def test_before_the_cut_there_is_no_piece_to_judge():
+    """Not even where the targets are the same all along; a run that ended before its cut has no number at all."""
+    run = cut_run(np.vstack([2 * TARGET[3:], TARGET[[3, 3, 3]]]))
+    run["values"]["volume_target"] = cut_run(TARGET[[3, 3, 3, 3]])["values"]["volume"]
+    assert of("piece_worst", **run) == pytest.approx(0.0, abs=1e-9)
+    run = cut_run(np.where(np.arange(4)[:, None] < 1, TARGET, np.nan))
     run["values"]["volume_target"] = np.full((4, 3), np.nan)
     assert np.isnan(of("piece_worst", **run))
 
 
-@pytest.mark.parametrize("frame", range(4))
+@pytest.mark.parametrize("frame", [0, 3])
 def test_the_sum_is_judged_in_every_frame(frame):
     volume = TARGET.copy()
     volume[frame] *= 0.999
@@ -68,14 +65,19 @@ def test_without_a_cut_there_is_no_number():
     assert run(**cut_run(TARGET)).part_volumes[0] == pytest.approx(TARGET, rel=1e-12)
 
 
+def opened_cube():
+    """The cube opened along its middle plane."""
+    inner = np.sort(CELLS[:, [[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]]].reshape(-1, 3), axis=1)
+    faces = np.unique(inner[(np.abs(POINTS[inner][..., 2]) < 1e-12).all(axis=1)], axis=0)
+    return opened(CELLS, faces, len(POINTS)), len(faces)
+
+
 @pytest.mark.parametrize("part", [0.0, 0.1])
 def test_the_mouth_of_a_cut_is_compared_with_its_own_side(part):
     """A cube in two halves of which the upper one moves up by 10 mm, in the body by a part of that less: the nodes of
     the trace lie at one place at rest, and next to the wrong one they would be 10 mm off. Half the surface that is not
     of the cut moves."""
-    inner = np.sort(CELLS[:, [[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]]].reshape(-1, 3), axis=1)
-    faces = np.unique(inner[(np.abs(POINTS[inner][..., 2]) < 1e-12).all(axis=1)], axis=0)
-    opening = opened(CELLS, faces, len(POINTS))
+    opening, _ = opened_cube()
     rest, cells = POINTS[opening.parent], opening.cells.astype(int)
     upper = np.zeros((len(rest), 3))
     upper[np.unique(cells[rest[cells].mean(axis=1)[:, 2] > 0]), 2] = 0.01
@@ -97,10 +99,8 @@ def test_the_mouth_of_a_cut_is_compared_with_its_own_side(part):
 
 def test_faces_of_a_cut_are_recognised_in_a_rounded_reference():
     """What lies twice at one place within 1e-6 of the size is no surface of the organ."""
-    inner = np.sort(CELLS[:, [[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]]].reshape(-1, 3), axis=1)
-    faces = np.unique(inner[(np.abs(POINTS[inner][..., 2]) < 1e-12).all(axis=1)], axis=0)
-    opening = opened(CELLS, faces, len(POINTS))
+    opening, faces = opened_cube()
     noise = np.random.default_rng(3).uniform(-1e-7, 1e-7, (len(opening.parent), 3))
     facets = boundary_triangles(opening.cells.astype(int))
     outside = run(**cut_run(TARGET))._outside(POINTS[opening.parent] + noise, facets)
-    assert len(facets) - len(outside) == 2 * len(faces) == 16
+    assert len(facets) - len(outside) == 2 * faces == 16

@@ -7,11 +7,9 @@ import pytest
 
 from studies.catalog.of_scene import study_of
 from studies.geometry import HalfSpace
-from studies.meshing.kept_shape import tell_shape
 from studies.metrics.trust import FEW_FACETS, Apart, apart, doubt, verdicts, within
 from studies.metrics.wish import Wish
-from studies.runs.prepare import mesh_of
-from studies.runs.recipes import QuadraticBody, SurfaceBody
+from studies.runs.recipes import QuadraticBody
 from studies.scene.cut import Cut
 from studies.scene.library.liver_probe import LIVER_PROBE
 from studies.scene.library.spleen_sag import SPLEEN_SAG
@@ -46,20 +44,12 @@ def test_how_far_two_bodies_are_apart():
     assert apart(body_run(COARSE), body_run(FINE)) == pytest.approx(Apart(0.0, 0.0), abs=1e-9)
 
 
-@pytest.mark.parametrize("share", [0.5, 1.0])
 @pytest.mark.parametrize(
     ("force", "displacement", "trusted"),
     [(2.9, 0.9, True), (3.1, 0.9, False), (2.9, 1.1, False), (np.nan, 0.9, True), (np.nan, np.nan, False)],
 )
-def test_both_must_be_within_a_share_of_the_wish(share, force, displacement, trusted):
-    assert within(Apart(share * force, share * displacement), WISH, share) == trusted
-
-
-def test_a_verdict_names_both_meshes_and_both_numbers():
-    (verdict,) = verdicts([body_run(FINE), body_run(COARSE, force=1.02, shift=0.9), body_run(SurfaceBody())])
-    assert not verdict.trusted and verdict.scene == "ball_clamped"
-    why = "two meshes (1,194 and 1,594 nodes) differ by 2 % in force and 10 % in displacement; allowed: 1.5 times"
-    assert verdict.why == f"{why} the target"
+def test_both_must_be_within_a_share_of_the_wish(force, displacement, trusted):
+    assert within(Apart(0.5 * force, 0.5 * displacement), WISH, 0.5) == trusted
 
 
 @pytest.mark.parametrize(
@@ -72,12 +62,6 @@ def test_meshes_of_an_organ_that_hangs_may_differ_by_less(scene, shift, trusted)
     assert verdict.trusted == trusted
 
 
-@pytest.mark.parametrize("shift", [1.0, 0.9999, 0.9])
-def test_coarse_meshes_are_not_trusted_even_where_they_agree(shift):
-    (verdict,) = verdicts([body_run(COARSE), body_run(replace(COARSE, nodes=994), shift=shift)])
-    assert not verdict.trusted and verdict.why.startswith("meshes with fewer than 1,594 nodes may agree and be wrong")
-
-
 CUT = replace(BALL, cuts=(Cut("section", HalfSpace((0.0, 0.0, 0.0), (0.0, 0.0, 1.0)), at=0.1),))
 
 
@@ -85,6 +69,7 @@ CUT = replace(BALL, cuts=(Cut("section", HalfSpace((0.0, 0.0, 0.0), (0.0, 0.0, 1
     ("scene", "coarse", "changes", "why"),
     [
         (BALL, COARSE, {}, ""),
+        (BALL, replace(COARSE, nodes=894), {"nodes": 1194}, "meshes with fewer than 1,594 nodes"),
         (BALL, replace(FINE, nodes=1494), {}, "meshes with nearly as many nodes"),
         (BALL, replace(COARSE, graded=True), {"graded": True}, "the rule is measured for adaptive bodies"),
         (CUT, COARSE, {}, "the rule is not measured for scenes with cuts"),
@@ -102,21 +87,14 @@ def test_the_study_of_a_scene_takes_the_nodes_that_its_warning_needs(scene):
     assert [case.body.nodes for case in bodies] == [1194, 1594] and not doubt(*bodies)
 
 
-@pytest.mark.campaign
 def test_a_body_that_warns_of_few_facets_is_not_trusted_however_near_two_meshes_are():
-    """The words are those of the warning before the run."""
-    with pytest.warns(UserWarning, match=FEW_FACETS) as records:
-        tell_shape(LIVER_PROBE, mesh_of(LIVER_PROBE, QuadraticBody(394)), filled=True)
-    (warning,) = [text for record in records if FEW_FACETS in (text := str(record.message))]
-    fine = body_run(FINE)
-    attributes = {**fine.record.attributes, "warnings": warning}
-    warned = replace(fine, record=replace(fine.record, attributes=attributes))
-    (trusted,) = verdicts([body_run(COARSE), fine])
-    (doubted,) = verdicts([body_run(COARSE), warned])
-    assert trusted.trusted and not doubted.trusted
-    assert doubted.why.startswith("too few facets touch the probe; two meshes")
-    other = replace(body_run(COARSE), record=replace(body_run(COARSE).record, attributes=attributes))
-    assert verdicts([other, fine])[0].trusted, "the coarser one is not in question"
+    def warned(made):
+        attributes = {**made.record.attributes, "warnings": FEW_FACETS}
+        return replace(made, record=replace(made.record, attributes=attributes))
+
+    (doubted,) = verdicts([body_run(COARSE), warned(body_run(FINE))])
+    assert not doubted.trusted and doubted.why.startswith("too few facets touch the probe; two meshes")
+    assert verdicts([warned(body_run(COARSE)), body_run(FINE)])[0].trusted, "the coarser one is not in question"
 
 
 def test_where_there_is_a_reference_it_judges():
@@ -128,9 +106,3 @@ def test_one_mesh_is_no_verdict_and_a_failed_run_none():
     assert verdicts([body_run(FINE)]) == []
     assert verdicts([body_run(FINE), body_run(COARSE, status=Status.INVERTED)]) == []
     assert verdicts([body_run(FINE), body_run(replace(COARSE, graded=True))]) == []
-
-
-@pytest.mark.parametrize(("shift", "trusted"), [(0.9999, True), (0.9, False)])
-def test_two_meshes_of_a_scene_without_a_reference_are_compared(shift, trusted):
-    (verdict,) = verdicts([body_run(COARSE, shift=shift), body_run(FINE)])
-    assert (verdict.scene, verdict.trusted) == ("ball_clamped", trusted) and "two meshes" in verdict.why

@@ -104,15 +104,12 @@ def test_nothing_comes_from_elsewhere(page, parsed):
     assert not re.search(r"url\((?!#)", page[1])
 
 
-def test_no_script_runs_but_its_own(page):
+def test_no_script_runs_but_its_own_and_no_name_or_text_can_break_it(page, parsed):
     """The policy names the script by its digest: no other runs, and no handler in an attribute."""
     script = page[1].split("<script>")[1].split("</script>")[0]
     digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
     policy = re.search(r"script-src ([^;]*);", page[1])
     assert policy is not None and policy[1] == f"'sha256-{digest}' 'strict-dynamic'"
-
-
-def test_no_name_or_text_can_break_it(page, parsed):
     assert NASTY not in page[1] and "<img" not in page[1]
     assert [tag for tag, _ in parsed.elements].count("script") == 2
     assert any(NASTY in case["about"] for case in data_of(page[1])["cases"].values())
@@ -132,7 +129,6 @@ def test_all_cases_are_in_the_table_once_and_all_rows_in_the_csv(page, parsed):
     assert len(rows) == len(losses()) + len(rates()) + 2 * len(theirs())
     assert set(rows["method"][rows["entry"]]) == {"theirs-half_step", "unable"}
     assert rows["force_end [%]"][0] == pytest.approx(-20.0) and NASTY in set(rows["scene"])
-    assert "volume_loss, frame_rate".replace("_", " ") in table
 
 
 def test_a_case_of_two_studies_has_replay_and_frame_times(page):
@@ -152,14 +148,10 @@ def test_a_case_of_two_studies_has_replay_and_frame_times(page):
 def test_a_case_without_recorded_positions_moves_between_its_checkpoints(page):
     """Of every record that reached one; the rest says why not."""
     cases = cases_of(page[1]).values()
-    straight = [case for case in cases if case.get("replay", {}).get("straight") and "entry" not in case]
-    assert [case["scene"] for case in straight] == ["ball_clamped"] and "surface, 550" in straight[0]["title"]
-    assert straight[0]["replay"]["times"] == pytest.approx([0.0, *HELD.checkpoints])
-    why = {case["why"] for case in cases if "replay" not in case}
-    assert why == {
-        "Nothing was computed, so there is no replay.",
-        "It ended before the first checkpoint, so no positions are stored and there is no replay.",
-    }
+    (straight,) = [case for case in cases if case.get("replay", {}).get("straight") and "entry" not in case]
+    assert straight["scene"] == "ball_clamped" and "surface, 550" in straight["title"]
+    assert straight["replay"]["times"] == pytest.approx([0.0, *HELD.checkpoints])
+    assert len({case["why"] for case in cases if "replay" not in case}) == 2
 
 
 def test_the_reference_has_its_own_shape_and_moves_as_it_did(page):
@@ -179,22 +171,17 @@ def test_entries_from_outside_stand_beside_ours_under_their_own_names(page):
     """With the replay of what they handed in: of one that moves 5 % too far."""
     cases = {case["entry"]: case for case in cases_of(page[1]).values() if "entry" in case}
     assert set(cases) == {"theirs-half_step", "unable"}
-    assert page[1].count('<span class="entry">entry</span>') == 2
     judged, unable = cases["theirs-half_step"], cases["unable"]
     assert judged["again"] == "organbench judge ball_clamped theirs.npz --name theirs-half_step"
     assert "nan" not in judged["title"] + judged["about"] and set(judged["histories"]) == {"volume", "force"}
-    times, checkpoints = judged["replay"]["times"], HELD.checkpoints
-    assert times == pytest.approx([0.0, *checkpoints]) and judged["replay"]["comparable"]
     shown = unpack_frames(judged["replay"]["positions"])
     truth = unpack_frames(data_of(page[1])["pieces"][f"reference-{judged['replay']['reference']}"]["positions"])
     assert shown[0] == pytest.approx(POINTS[:6], abs=1e-4)
     assert shown[-1] - POINTS[:6] == pytest.approx(1.05 * (truth[-1] - POINTS[:6]), abs=2e-4)
-    assert "replay" not in unable and unable["why"] == "Nothing was computed, so there is no replay."
-    assert "skipped (unable: it knows no caps)" in unable["about"]
-    assert f"{len(losses()) + 2} cases, among them 2 entries of other programs, of 2 studies" in page[1]
+    assert "replay" not in unable and "it knows no caps" in unable["about"]
 
 
-@pytest.mark.parametrize(("less", "outside"), [(300, 1), (5_000, 4), (10**6, 12)])
+@pytest.mark.parametrize(("less", "outside"), [(5_000, 4), (10**6, 12)])
 def test_what_has_no_room_in_the_page_lies_beside_it(kept, page, tmp_path, monkeypatch, less, outside):
     """Whole: nothing is left out. The first case and its reference have room before all others."""
     root = shutil.copytree(kept[0], tmp_path / "kept")
@@ -218,20 +205,14 @@ def test_what_has_no_room_in_the_page_lies_beside_it(kept, page, tmp_path, monke
     assert inside["pieces"] | loaded == whole["pieces"] and not set(inside["pieces"]) & set(loaded)
 
 
-def test_without_results_there_is_no_page(tmp_path):
+def test_report_writes_it_the_same_again_and_nothing_without_results(results, tmp_path):
     assert write_page(tmp_path, [tiny_study()]) == (None, []) and not (tmp_path / "report.html").exists()
-
-
-def test_report_writes_it_the_same_again(results):
-    written, _ = report(Ledger(results), [tiny_study()])
-    assert written[-1] == results / "report.html" and part_path(results, tiny_study()).is_file()
-    before = written[-1].read_bytes()
-    assert report(Ledger(results), [tiny_study()])[0][-1].read_bytes() == before
+    before = report(Ledger(results), [tiny_study()])[0][-1].read_bytes()
     part_path(results, tiny_study()).unlink()
     assert report(Ledger(results), [tiny_study()])[0][-1].read_bytes() == before
 
 
-@pytest.mark.parametrize("text", ['{"rows"', "[]", "{}", "", "null", "of this {}"])
+@pytest.mark.parametrize("text", ['{"rows"', "[]", "of this {}"])
 def test_a_damaged_part_is_gathered_again(results, text):
     before = report(Ledger(results), [tiny_study()])[0][-1].read_bytes()
     path = part_path(results, tiny_study())
@@ -248,14 +229,13 @@ def test_a_damaged_part_of_a_study_without_results_is_left_out_and_named(kept, t
 
 
 @pytest.mark.parametrize("kind", ["cases", "references"])
-@pytest.mark.parametrize("name", ["/../../../stray", "xyz", "'"])
-def test_no_part_writes_a_file_elsewhere(kept, tmp_path, monkeypatch, kind, name):
+def test_no_part_writes_a_file_elsewhere(kept, tmp_path, monkeypatch, kind):
     """A stranger may write a part with its digest: a part that names files is refused."""
     monkeypatch.setattr(module, "LIMIT", 0)
     root = shutil.copytree(kept[0], tmp_path / "kept")
     path = part_path(root, kept[1][0])
     part = json.loads(path.read_bytes().split(b"\n", 1)[1])
-    part[kind] = {name: next(iter(part[kind].values()))}
+    part[kind] = {"/../../../stray": next(iter(part[kind].values()))}
     content = json.dumps(part).encode()
     path.write_bytes(hashlib.sha256(content).hexdigest().encode() + b"\n" + content)
     remarks = write_page(root, kept[1])[1]
@@ -270,8 +250,7 @@ def test_commands_name_the_file_of_an_own_study(kept, tmp_path, monkeypatch):
     monkeypatch.setattr(module, "answers", lambda best, scenes: calls.append((best, scenes)) or {})
     path, _ = write_page(root, [own, kept[1][1]])
     assert path is not None
-    # Its scenes are answered for, and come first.
-    best, scenes = calls[-1]
+    best, scenes = calls[-1]  # its scenes are answered for, and come first
     assert scenes == {run.case.scene.name for run in losses()} and best[0]["scene"] in scenes
     text = path.read_text(encoding="utf-8")
     assert "organbench run &#39;my rod.py&#39; frame_rate" in text and "organbench report &#39;my rod.py&#39;" in text
@@ -279,16 +258,14 @@ def test_commands_name_the_file_of_an_own_study(kept, tmp_path, monkeypatch):
     assert len(runs) == len(losses()) and all(run.startswith("organbench run 'my rod.py' --case ") for run in runs)
 
 
-def test_charts_are_the_same_again_small_and_without_what_a_page_has_no_use_for(kept, tmp_path):
+def test_charts_are_the_same_again_and_refer_to_themselves_alone(kept, tmp_path):
     made_up_parts(tmp_path)
     charts = [read_part(root, kept[1][0])["charts"] for root in (kept[0], tmp_path)]
-    assert [chart["file"] for chart in charts[0]] == ["volume.png", "squeeze.png"]
-    shown = [[inline(chart["svg"], "c", "A") for chart in each] for each in charts]
-    assert shown[0] == shown[1]
-    for chart in charts[0]:
-        shown = inline(chart["svg"], "c", "A <title>")
-        assert len(shown) < len(chart["svg"]) and "<metadata" not in shown and "&lt;title&gt;" in shown
-        assert Parsed(shown).wrong == [] and "<text" in shown
-        used = set(re.findall(r"(?:url\(#|href=\"#)([^\")]+)", shown))
-        assert used <= set(Parsed(shown).ids()) and all(name.startswith("c-") for name in used)
+    shown, again = ([inline(chart["svg"], "c", "A <title>") for chart in each] for each in charts)
+    assert shown == again and [chart["file"] for chart in charts[0]] == ["volume.png", "squeeze.png"]
+    for chart, text in zip(charts[0], shown, strict=True):
+        assert len(text) < len(chart["svg"]) and "<metadata" not in text and "&lt;title&gt;" in text
+        assert Parsed(text).wrong == [] and "<text" in text
+        used = set(re.findall(r"(?:url\(#|href=\"#)([^\")]+)", text))
+        assert used <= set(Parsed(text).ids()) and all(name.startswith("c-") for name in used)
     assert "data:image/png" in charts[0][1]["svg"]  # faces, which may be thousands, as a picture

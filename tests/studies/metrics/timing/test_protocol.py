@@ -55,20 +55,20 @@ def test_turns_are_taken_and_the_warm_up_is_thrown_away():
     assert gc.isenabled()
 
 
-@pytest.mark.parametrize(("contestants", "repeats"), [({}, 3), ({"a": lambda: np.ones(2)}, 0)])
-def test_nothing_to_measure_is_refused(contestants, repeats):
-    with pytest.raises(StudyError, match="timing needs a contestant and at least one repeat"):
-        interleave(contestants, repeats)
+LENGTHS = iter([2, 2, 3])
+REFUSED = [
+    (lambda: interleave({}, 3), "timing needs a contestant and at least one repeat"),
+    (lambda: interleave({"a": lambda: np.ones(2)}, 0), "timing needs a contestant and at least one repeat"),
+    (lambda: interleave({"a": lambda: np.ones(next(LENGTHS))}, repeats=2), "'a' must return the same number"),
+    *(
+        (lambda frame_ns=frame_ns: FrameTiming(frame_ns), "frame times must be positive")
+        for frame_ns in (np.ones(3), np.ones((0, 3)), np.zeros((2, 2)), np.full((1, 2), np.nan))
+    ),
+]
 
 
-def test_a_contestant_that_changes_its_frames_is_named():
-    lengths = iter([2, 2, 3])
-    with pytest.raises(StudyError, match="'a' must return the same number of frame times"):
-        interleave({"a": lambda: np.ones(next(lengths))}, repeats=2)
+@pytest.mark.parametrize(("call", "sentence"), REFUSED)
+def test_what_is_no_timing_is_refused(call, sentence):
+    with pytest.raises(StudyError, match=sentence):
+        call()
     assert gc.isenabled()
-
-
-@pytest.mark.parametrize("frame_ns", [np.ones(3), np.ones((0, 3)), np.zeros((2, 2)), np.full((1, 2), np.nan)])
-def test_impossible_frame_times_are_refused(frame_ns):
-    with pytest.raises(StudyError, match="frame times must be positive"):
-        FrameTiming(frame_ns)

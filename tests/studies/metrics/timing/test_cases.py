@@ -21,28 +21,22 @@ from tests.studies.tiny import FRAMES, diverging_case, tiny_case
 KEPT, LOOSE = tiny_case(timed=True), tiny_case(method=Free(), timed=True)
 
 
-def content(folder):
-    return {path.name: path.read_bytes() for path in folder.iterdir()}
-
-
-def test_a_file_beside_the_physics(results):
-    file = timing_file(results, "tiny", KEPT)
-    physics = case_path(results, "tiny", KEPT)
+def test_a_file_beside_the_physics_holds_frames_and_stages(results):
+    file, physics = timing_file(results, "tiny", KEPT), case_path(results, "tiny", KEPT)
     assert file.name == f"{physics.stem}.timing.{machine_id()}.h5"
     record = read_record(file)
     assert (record.kind, record.status, record.key) == ("timing", Status.OK, KEPT.key)
     assert record.fields["frame_ns"].values.shape == (module.REPEATS, FRAMES)
-    assert record.fields["frame_ns"].unit == "ns"
-    assert record.attributes["threads"] == 1
+    assert record.fields["frame_ns"].unit == "ns" and record.attributes["threads"] == 1
     assert "frame_ns" not in read_record(physics).fields
+    stages, times = record.fields["stages"].values.tolist(), record.fields["stage_ns"].values
+    assert times.shape == (len(stages), FRAMES) and (times >= 0).all()
+    for stage in ("springs and prediction", "contact search"):
+        assert (times[stages.index(stage)] > 0).all()
 
 
 def why_untimed(root, case):
     return ledger.Ledger(root).why_untimed(jobs_module.CaseJob(root, "tiny", case))
-
-
-def read_timing(root, case):
-    return frame_times(ledger.Ledger(root), jobs_module.CaseJob(root, "tiny", case))
 
 
 def can_be_timed(root, case):
@@ -54,7 +48,7 @@ def test_current_until_the_code_changes_or_on_another_machine(results, monkeypat
     for caller in (module, jobs_module):
         monkeypatch.setattr(caller, "case_fingerprint", lambda case: "edited")
     assert why_untimed(results, KEPT) == CODE_CHANGED
-    assert read_timing(results, KEPT) is None
+    assert frame_times(ledger.Ledger(results), jobs_module.CaseJob(results, "tiny", KEPT)) is None
     monkeypatch.undo()
     monkeypatch.setattr(ledger, "machine_id", lambda: "00000000")
     assert why_untimed(results, KEPT) == MISSING
@@ -100,16 +94,8 @@ def test_a_long_run_is_timed_less_often(monkeypatch):
 
 
 def test_a_run_that_breaks_off_while_timed_is_not_stored(results, monkeypatch):
-    before = content(results / "tiny")
+    before = {path.name: path.read_bytes() for path in (results / "tiny").iterdir()}
     monkeypatch.setattr(module, "prepare", lambda case: prepare(diverging_case()))
     with pytest.raises(StudyError, match=r"positive"):
         time_cases(results, "tiny", [KEPT], lambda name: None)
-    assert content(results / "tiny") == before
-
-
-def test_the_time_of_each_stage_is_stored_with_the_frames(finished_sweep):
-    record = read_record(timing_file(finished_sweep, "tiny", tiny_case(timed=True)))
-    stages, times = record.fields["stages"].values.tolist(), record.fields["stage_ns"].values
-    assert times.shape == (len(stages), record.fields["frame_ns"].values.shape[1])
-    assert (times >= 0).all() and (times[stages.index("springs and prediction")] > 0).all()
-    assert (times[stages.index("contact search")] > 0).all()
+    assert {path.name: path.read_bytes() for path in (results / "tiny").iterdir()} == before
