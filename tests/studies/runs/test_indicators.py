@@ -86,6 +86,14 @@ def test_each_indicator_has_a_remark_beyond_its_bound(changed, word):
     assert word in remark
 
 
+def test_pressures_are_those_of_the_last_good_frame():
+    body = quadratic_body(*quadratic_block((1, 1, 1)), SOFT)
+    pressure = np.full((50, body.kept.count), np.nan)
+    pressure[1] = 7.0
+    ended = history(np.ones_like, good_frames=2, pressure=pressure)
+    assert indicators(SQUEEZE, body, ended, -1)["alternation"] == 0.0
+
+
 def test_a_record_has_them(mesh_cache):
     """A run of five frames has too few at rest; nodal volumes of a coarse ball alternate."""
     case = tiny_case()
@@ -94,11 +102,3 @@ def test_a_record_has_them(mesh_cache):
     assert record.attributes["unknowns_per_volume"] == 3.0 and np.isnan(record.attributes["sway"])
     assert record.attributes["alternation"] > 0.0
     assert ("alternate" in record.attributes["warnings"]) == (record.attributes["alternation"] > 0.3)
-
-
-def test_pressures_are_those_of_the_last_good_frame():
-    body = quadratic_body(*quadratic_block((1, 1, 1)), SOFT)
-    pressure = np.full((50, body.kept.count), np.nan)
-    pressure[1] = 7.0
-    ended = history(np.ones_like, good_frames=2, pressure=pressure)
-    assert indicators(SQUEEZE, body, ended, -1)["alternation"] == 0.0

@@ -6,15 +6,14 @@ import numpy as np
 import pytest
 
 from massspring import Capsule, Free, ImplicitVolume, Plane, Sphere, Trajectory
-from studies.lab.publish.kept_volume import PROMISED, kept_volumes, promised
+from studies.lab.publish.kept_volume import PROMISED
 from studies.lab.publish.kept_volume import worst_volume as worst
 from studies.runs.case import Case
-from studies.runs.current import case_path
 from studies.runs.recipes import SurfaceBody, TetrahedralBody
 from studies.runs.run import measure
 from studies.scene.library import BALL_CLAMPED, BALL_SQUEEZE, BLADDER_FILL, JUDGED, LIVER_PRESS
-from studies.store.record import Status, read_record, write_record
-from tests.studies.tiny import SQUEEZE, bodies_of, diverging_case, tiny_case, tiny_study
+from studies.store.record import Status
+from tests.studies.tiny import SQUEEZE, bodies_of, tiny_case
 
 FRAMES = 40
 HELD_NODES = 100
@@ -83,26 +82,3 @@ def test_contact_held_still_loses_nothing(obstacle, volumes):
     # The path ends at 1 of 4 s; what is left of the swing is looked at in the last second.
     error = np.abs(record.fields["volume"].values[-5:] / record.fields["volume_target"].values[-5:] - 1)
     assert error.max() <= STATIC
-
-
-def test_the_promise_covers_the_default_step_from_rest_alone():
-    assert promised(tiny_case())
-    assert promised(tiny_case(dt_fraction=0.05))
-    assert not any(map(promised, (tiny_case(method=Free()), tiny_case(dt_fraction=0.9), tiny_case(dt=1e-3))))
-
-
-def test_the_table_is_read_off_the_stored_runs(results):
-    study = tiny_study()
-    table = kept_volumes(results, [study])
-    (row,) = table.to_dict("records")
-    path = case_path(results, "tiny", tiny_case(timed=True))
-    record = read_record(path)
-    assert row["worst |V/V0 - 1| [1]"] == worst(record)
-    assert (row["at most 1e-4"], row["volumes"], row["scene"]) == ("yes", 1, SQUEEZE.name)
-    spoiled = record.fields["volume"].values.copy()
-    spoiled[2] *= 1.0002
-    fields = record.fields | {"volume": replace(record.fields["volume"], values=spoiled)}
-    write_record(path, replace(record, fields=fields))
-    assert kept_volumes(results, [study])["at most 1e-4"].tolist() == ["NO"]
-    assert kept_volumes(results / "nowhere", [study]).empty
-    assert kept_volumes(results, [tiny_study(cases=(diverging_case(),))]).empty

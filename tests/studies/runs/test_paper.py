@@ -52,17 +52,6 @@ def test_the_probe_stays_outside_and_presses_while_it_slides(slide):
     assert np.abs(slide.history.volume / slide.history.volume_target - 1).max() < 1e-4
 
 
-@pytest.mark.campaign
-def test_what_is_drawn_of_the_slide_is_the_run(slide):
-    figure = paper_slide.figure(slide)
-    assert len(figure.axes) == 6
-    texts = [text.get_text() for axes in figure.axes for text in axes.texts]
-    for frame in moments(slide).values():
-        assert any(f"force {1e3 * slide.force[frame]:.1f} mN" in text for text in texts)
-    deep = figure.axes[1].collections[0].get_paths()
-    assert len(deep) > 0.3 * len(slide.prepared.setup.body.triangles)  # what faces the eye, and the shaft
-
-
 def test_the_shaft_ends_at_the_tip():
     tip = np.array([0.01, 0.02, 0.03])
     corners, normals = paper_slide.rod(tip)
@@ -80,10 +69,3 @@ def test_the_curves_are_the_volumes(balls, tmp_path):
     assert paper_ball.change(balls["free"])[-1] < -5 < -1e-2 < paper_ball.change(balls["implicit_volume"])[-1]
     paper_ball.draw(balls, tmp_path / "a.png", tmp_path / "b.png")
     assert (tmp_path / "a.png").stat().st_size > 2000 and (tmp_path / "b.png").stat().st_size > 2000
-
-
-def test_the_squeezed_balls_say_what_they_lost(balls):
-    figure = paper_ball.squeezed_figure(balls)
-    labels = "\n".join(text.get_text() for axes in figure.axes for text in axes.texts)
-    assert f"{paper_ball.change(balls['free'])[-1]:+.1f} %".replace("-", "−") in labels
-    assert "volume kept within" in labels

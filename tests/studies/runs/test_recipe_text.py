@@ -28,12 +28,6 @@ def test_only_what_was_chosen_is_named():
     assert recipe_text(case) == '{"body": {"kind": "quadratic", "nodes": 794}, "dt_fraction": 0.8}'
 
 
-@pytest.mark.parametrize("method", [Free(), Xpbd("whole", iterations=2)])
-def test_a_method_comes_back_with_its_settings(method):
-    case = Case(LIVER_PRESS, method=method, dt=1e-3, frames=7, precision="float32" if method == Free() else "float64")
-    assert case_of_recipe(LIVER_PRESS, recipe_text(case)) == case
-
-
 @pytest.mark.parametrize(
     ("text", "message"),
     [

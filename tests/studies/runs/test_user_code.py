@@ -112,45 +112,6 @@ def test_a_new_chart_or_metric_is_drawn_without_running(organbench, mine, ran):
     assert path.stat().st_mtime_ns == before
 
 
-def test_lines_of_the_page_name_the_file(mine, ran):
-    """Both run the case again: from the study, and bit for bit from its record, with the file that its method is in."""
-    study = find_study(str(mine))
-    refresh(Ledger(ran), study)
-    part = read_part(ran, study)
-    assert part is not None
-    for case, name in zip(part["cases"].values(), (case.name for case in study.cases), strict=True):
-        assert case["run"] == f"organbench run {mine.name} --case {name}"
-    assert [case["again"].endswith(f".h5 --file {mine.name}") for case in part["cases"].values()] == [
-        bool(files_of(case)) for case in study.cases
-    ]
-    assert any(" --file " in case["again"] for case in part["cases"].values())
-
-
-def test_replay_runs_the_file_that_the_user_names(organbench, refused, mine, ran):
-    record = case_path(ran, "calm", find_study(str(mine)).cases[2])
-    user_code.forget()
-    assert f"was made with the program {mine}, and" in (sentence := refused("replay", record))
-    assert f"add --file {mine}, or where it is now" in sentence
-    code, out, err = organbench("replay", record, "--file", mine)
-    assert code == 0 and "the same, bit for bit" in out and not err
-    moved = mine.rename(mine.with_name("elsewhere.py"))
-    user_code.forget()
-    assert "the same, bit for bit" in organbench("replay", record, "--file", moved)[1]
-    edit(moved, "1.0 / edges.length,", "1.0 / edges.length**2,")
-    message = f"{moved} is not the file that {record} was made with: its content has changed"
-    assert message in refused("replay", record, "--file", moved)
-    code, out, err = organbench("replay", record, "--file", moved, "--changed")
-    assert code == 1 and "differs by up to" in out and "the code has changed since it was stored" in out
-    assert f"warning: {message}" in err
-
-
-def test_a_view_needs_no_file(organbench, mine, ran, tmp_path):
-    find_study(str(mine))
-    user_code.forget()
-    _, out, err = organbench("view", "ball_on_the_moon", "--results", ran, "-o", tmp_path / "a.vtkhdf")
-    assert "3 bodies" in out and not err
-
-
 NAMES = {
     "method": ('"calm"\n    share', '"free"\n    share', "method 'free' is one of the project's own"),
     "law": ("def bars", "def uniform", "law 'uniform' is one of the project's own"),
@@ -216,3 +177,17 @@ def test_a_method_and_a_law_name_their_file_each_alone_and_ours_none(mine):
     bodies = [TetrahedralBody(law=law) for law in ("bars", "van_gelder")]
     named = [files_of(tiny_case(body=body, method=method)) for method in (calm, ours) for body in bodies]
     assert [[file.path for file in files] for files in named] == [[mine], [mine], [mine], []]
+
+
+def test_lines_of_the_page_name_the_file(mine, ran):
+    """Both run the case again: from the study, and bit for bit from its record, with the file that its method is in."""
+    study = find_study(str(mine))
+    refresh(Ledger(ran), study)
+    part = read_part(ran, study)
+    assert part is not None
+    for case, name in zip(part["cases"].values(), (case.name for case in study.cases), strict=True):
+        assert case["run"] == f"organbench run {mine.name} --case {name}"
+    assert [case["again"].endswith(f".h5 --file {mine.name}") for case in part["cases"].values()] == [
+        bool(files_of(case)) for case in study.cases
+    ]
+    assert any(" --file " in case["again"] for case in part["cases"].values())

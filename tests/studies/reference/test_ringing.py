@@ -5,20 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from massspring import Capsule, Plane, Probe, Sphere, Trajectory
-from reference_fem import RigidCapsule, RigidPlane, RigidSphere
 from reference_fem.dynamics import inertia
 from reference_fem.uncertainty import combined
 from studies.base.errors import StudyError
 from studies.metrics.metrics import METRICS, frequency_error
 from studies.metrics.run import Run
 from studies.reference.load import load_reference
-from studies.reference.problem import rigid
 from studies.reference.reference_solves import ReferenceSolve
 from studies.reference.ringing import fitted_frequency
 from studies.reference.solve import solve
 from studies.runs.case import Case
-from studies.runs.prepare import prepare
 from studies.runs.recipes import TetrahedralBody
 from studies.runs.run import measure
 from studies.scene.library.ball_ringing import BALL_RINGING, RADIUS
@@ -95,17 +91,6 @@ def test_a_mass_spring_ball_is_judged_by_its_frequency(reference):
     assert metric.uncertainty(Run(case, record, reference)) == 100.0 * reference.total_uncertainty["frequency"]
 
 
-def test_both_solvers_start_with_the_same_speed():
-    prepared = prepare(Case(SCENE, TetrahedralBody(150)))
-    rest = prepared.setup.body.rest
-    assert prepared.setup.positions is None
-    assert SCENE.start is not None
-    np.testing.assert_array_equal(prepared.setup.velocity, SCENE.start.velocities(rest))
-    assert prepared.setup.velocity is not None
-    top = np.argmax(rest[:, 2])
-    assert prepared.setup.velocity[top, 2] == pytest.approx(3.5 * RADIUS, rel=0.02)
-
-
 def test_a_load_path_builds_no_mass(mesh_cache, tmp_path, monkeypatch):
     """Quasi-static scenes skip dynamics altogether."""
 
@@ -142,27 +127,3 @@ def test_a_scene_at_rest_has_no_frequency():
     assert not allowed(BALL_SQUEEZE, "frequency")
     assert allowed(SCENE, "frequency")
     assert not allowed(SCENE, "pressure")  # it swings about zero
-
-
-def test_obstacles_come_over_with_their_slip():
-    path = Trajectory((0.0, 1.0), ((0.0, 0.0, 0.0), (0.0, 0.0, -0.01)))
-    rod = rigid(Capsule((0.0, 0.0, 0.1), (0.1, 0.0, 0.1), 0.02, path, "no_slip"))
-    assert isinstance(rod, RigidCapsule)
-    assert (rod.start, rod.end, rod.radius, rod.slip) == ((0.0, 0.0, 0.1), (0.1, 0.0, 0.1), 0.02, "no_slip")
-    assert rod.motion is path
-    ball, wall = rigid(Sphere((0.0, 0.0, 0.1), 0.02, path)), rigid(Plane((0.0, 0.0, 1.0), (0.0, 0.0, -2.0), path))
-    assert isinstance(ball, RigidSphere)
-    assert isinstance(wall, RigidPlane)
-    assert (ball.slip, wall.slip) == ("frictionless", "frictionless")
-
-
-@pytest.mark.parametrize(
-    ("obstacle", "words"),
-    [
-        (Plane((0.0, 0.0, 1.0), (0.0, 0.0, -1.0), friction=0.3), r"friction 0\.3.*no_slip"),
-        (Probe((0.0, 0.0, 1.0)), "thin probe"),
-    ],
-)
-def test_obstacles_the_reference_does_not_know(obstacle, words):
-    with pytest.raises(StudyError, match=words):
-        rigid(obstacle)
