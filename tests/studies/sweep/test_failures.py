@@ -21,10 +21,10 @@ from studies.store.record import Status, peek, read_record, write_record
 from studies.sweep.job import ReferenceJob, do, jobs_of
 from studies.sweep.load import load_runs
 from studies.sweep.local import environment
-from studies.sweep.run_studies import Failures, run_studies
+from studies.sweep.run_studies import Failures
 from studies.sweep.standings import failed, standings
 from tests.studies.octant import SCENE
-from tests.studies.tiny import Silent, diverging_case, tiny_case, tiny_study
+from tests.studies.tiny import tiny_case, tiny_study
 
 ROOT = Path(__file__).parents[3]
 FATAL = """
@@ -63,15 +63,6 @@ def test_a_piece_that_died_is_stored_as_failed(tmp_path):
     assert [standing.status for standing in standings(ledger, tiny_study(cases=(case,)))] == ["failed"] * 2
     sentence = failures.sentence("again")
     assert sentence.startswith(f"failed: {jobs[0].label} (its process died), and 1 more; all others are done")
-
-
-def test_a_folder_in_the_place_of_a_file_costs_its_case(results):
-    path = case_path(results, "tiny", diverging_case())
-    path.unlink()
-    path.mkdir()
-    failures = Failures()
-    run_studies(results, [tiny_study()], 1, Silent(), failures=failures)
-    assert failures.causes == {diverging_case().name: f"{path} is a folder where a file belongs: delete it"}
 
 
 def test_what_another_command_has_done_meanwhile_is_not_done_again(results):
@@ -152,33 +143,32 @@ UNPUBLISHED = replace(BALL_CLAMPED, checkpoints=(1.0,))
 """Nobody published its reference."""
 
 
-def test_a_mesh_that_cannot_be_made_is_stored_as_failed_with_its_reason(tmp_path, monkeypatch):
-    def refuse(root, solve):
-        raise StudyError("ball: use more nodes")
+def refuse(*_):
+    raise StudyError("ball: use more nodes")
 
-    monkeypatch.setattr("studies.reference.solve.solve", refuse)
+
+def no_inverse(*_):
+    """As for a stomach of the population, which ended a study of five hours."""
+    return np.linalg.solve(np.zeros((1, 1)), np.ones(1))
+
+
+@pytest.mark.parametrize(
+    ("fault", "message"),
+    [
+        (refuse, "ball: use more nodes"),
+        (no_inverse, "the equations of the reference cannot be solved: Singular matrix"),
+    ],
+)
+def test_a_reference_that_cannot_be_solved_costs_one_scene_and_not_the_sweep(tmp_path, monkeypatch, fault, message):
+    monkeypatch.setattr("studies.reference.solve.solve", fault)
     job = ReferenceJob(tmp_path, REFERENCES, reference_solves(UNPUBLISHED)[0])
     stored = peek(do(job))
-    assert (stored.status, stored.message) == (Status.FAILED, "ball: use more nodes")
+    assert (stored.status, stored.message) == (Status.FAILED, message)
     assert Ledger(tmp_path).why(job) is None
 
 
-def test_equations_without_a_solution_cost_one_scene_and_not_the_sweep(tmp_path, monkeypatch):
-    """A stomach of the population ended a study of five hours by a dense system without an inverse."""
-    monkeypatch.setattr("studies.reference.solve.solve", lambda *_: np.linalg.solve(np.zeros((1, 1)), np.ones(1)))
-    job = ReferenceJob(tmp_path, REFERENCES, reference_solves(UNPUBLISHED)[0])
-    stored = peek(do(job))
-    assert (stored.status, stored.message) == (
-        Status.FAILED,
-        "the equations of the reference cannot be solved: Singular matrix",
-    )
-
-
 def test_a_result_that_cannot_be_stored_ends_the_sweep(tmp_path, monkeypatch):
-    def full(*_):
-        raise StudyError("no space is left")
-
-    monkeypatch.setattr("studies.reference.solve.solve", full)
-    monkeypatch.setattr("studies.sweep.job.write_record", full)
-    with pytest.raises(StudyError, match="no space is left"):
+    monkeypatch.setattr("studies.reference.solve.solve", refuse)
+    monkeypatch.setattr("studies.sweep.job.write_record", refuse)
+    with pytest.raises(StudyError, match="use more nodes"):
         do(ReferenceJob(tmp_path, REFERENCES, reference_solves(UNPUBLISHED)[0]))

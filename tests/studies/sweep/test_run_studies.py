@@ -7,13 +7,15 @@ import h5py
 import pytest
 
 from studies.base.errors import StudyError
+from studies.metrics.table import frame_of, metric, study_table
 from studies.metrics.timing import cases as timed
+from studies.metrics.timing.cases import timing_file
 from studies.runs.current import case_path
 from studies.scene.scene import ReferencePlan
 from studies.store.ledger import Ledger
 from studies.store.record import Status, read_record, write_record
 from studies.sweep.job import CaseJob, jobs_of
-from studies.sweep.load import load_runs
+from studies.sweep.load import References, load_runs, table_rows
 from studies.sweep.local import Local
 from studies.sweep.run_studies import run_studies
 from studies.sweep.standings import failed, standings, warnings_of
@@ -95,14 +97,6 @@ def test_only_what_the_filter_lets_through(results):
     assert counts(results, study) == {"ok": 1, "stale": 1, "diverged": 1}
 
 
-def test_missing_cases_are_remarked_on(tmp_path):
-    study = tiny_study()
-    assert counts(tmp_path, study) == {"missing": 3}
-    runs, remarks = load_runs(tmp_path, study)
-    assert runs == []
-    assert remarks == [f"case {case.name} has not run" for case in study.cases]
-
-
 def test_references_are_shared_and_come_first(tmp_path):
     larger = replace(SCENE, name="larger", reference=ReferencePlan("octant", (0.5, 0.25)))
     cases = tiny_case(scene=SCENE), tiny_case(scene=larger)
@@ -130,3 +124,21 @@ def test_a_folder_that_cannot_be_written_to_is_refused_before_anything_runs(tmp_
     monkeypatch.setattr(Local, "map", lambda *_: pytest.fail("nothing may run"))
     with pytest.raises(StudyError, match="choose a folder that can be written to"):
         run_studies(tmp_path / "file", [tiny_study()], 1, Silent())
+
+
+STUDY = tiny_study(columns=("volume_worst", "step_time", "min_j"))
+
+
+def table_of(root):
+    rows, remarks = table_rows(References(Ledger(root)), STUDY, [metric(name) for name in STUDY.columns])
+    return frame_of(rows), remarks
+
+
+def test_the_rows_of_a_table_are_those_of_the_runs_and_what_is_missing_is_a_remark(results):
+    table, remarks = table_of(results)
+    assert table.equals(study_table(load_runs(results, STUDY)[0], STUDY.columns)) and remarks == []
+    timing_file(results, "tiny", STUDY.cases[0]).unlink()
+    assert table_of(results)[0]["step_time [µs]"].isna().tolist() == [True, False, True]
+    case_path(results, "tiny", STUDY.cases[1]).unlink()
+    table, remarks = table_of(results)
+    assert len(table) == 2 and remarks == [f"case {STUDY.cases[1].name} has not run"]

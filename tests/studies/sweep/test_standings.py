@@ -10,10 +10,12 @@ from massspring import Free
 from studies.base.errors import StudyError
 from studies.catalog import STUDIES, Study
 from studies.reference.reference_solves import ReferenceSolve
+from studies.runs.current import case_path
 from studies.scene.scene import ReferencePlan
-from studies.store.record import Status
+from studies.store.ledger import Ledger
+from studies.store.record import Status, read_record, write_record
 from studies.sweep.job import CaseJob, ReferenceJob
-from studies.sweep.standings import CAUSES, Standing, causes, summary, unexpected
+from studies.sweep.standings import CAUSES, Standing, causes, machines_of, mixture, standings, summary, unexpected
 from tests.studies.tiny import SQUEEZE, tiny_case, tiny_study
 
 ROOT = Path(__file__).parents[3]
@@ -68,3 +70,29 @@ def test_an_unknown_status_cannot_be_expected():
     with pytest.raises(StudyError, match="expects is 'diverged'; give a tuple"):
         tiny_study(expects="diverged")
     assert tiny_study(cases=(tiny_case(method=Free()),)).accepts("diverged")
+
+
+def stored_by(results, case, **changes):
+    """Makes the record of a case one of another machine."""
+    path = case_path(results, "tiny", case)
+    record = read_record(path)
+    write_record(path, replace(record, **{"attributes": record.attributes, **changes}))
+    return record.machine
+
+
+def test_status_says_how_many_kinds_of_machines_a_study_mixes(results, tiny_file, organbench):
+    study = tiny_study()
+    assert mixture(machines_of(standings(Ledger(results), study))) is None, "all are of this one"
+    here = stored_by(results, study.cases[0], machine="00000000")
+    assert machines_of(standings(Ledger(results), study)) == {here: 2, "00000000": 1}
+    shown = organbench("show", tiny_file, "--results", results)[1]
+    sentence = (
+        f"made on 2 kinds of processors, whose results differ by rounding: 2 of machine {here}, 1 of machine 00000000"
+    )
+    assert f"  {sentence}\n" in shown
+
+
+def test_stale_results_do_not_count(results):
+    study = tiny_study()
+    stored_by(results, study.cases[0], machine="00000000", fingerprint="0")
+    assert mixture(machines_of(standings(Ledger(results), study))) is None

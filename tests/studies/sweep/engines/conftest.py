@@ -1,8 +1,6 @@
 """A small cluster on this machine, and what a sweep on it leaves."""
 
-import json
 import logging
-import time
 from contextlib import nullcontext
 from dataclasses import replace
 
@@ -56,12 +54,3 @@ def assert_equal_bits(one, other):
         assert one[name][1].keys() == other[name][1].keys()
         for field, values in one[name][1].items():
             assert values.tobytes() == other[name][1][field].tobytes(), (name, field)
-
-
-def address_in(file, seconds=60.0):
-    """What a scheduler file says as soon as it is there."""
-    until = time.monotonic() + seconds
-    while not file.exists():
-        assert time.monotonic() < until, "the scheduler did not start"
-        time.sleep(0.05)
-    return json.loads(file.read_text())["address"]

@@ -1,12 +1,7 @@
 """A sweep on a cluster leaves what one on this machine leaves, whatever dies on the way."""
 
 import logging
-import os
-import shutil
-import subprocess
-import sys
 from contextlib import contextmanager
-from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -19,11 +14,9 @@ from studies.sweep.engines.cluster import Cluster, Session, timed_on
 from studies.sweep.find_study import find_study
 from studies.sweep.load import load_runs
 from studies.sweep.run_studies import Failures, run_studies
-from tests.studies.sweep.engines.conftest import address_in, assert_equal_bits, engine_at, physics, swept
+from tests.studies.sweep.engines.conftest import assert_equal_bits, physics, swept
 from tests.studies.sweep.test_failures import FATAL
 from tests.studies.tiny import FRAMES, Silent, content, tiny_study
-
-ROOT = Path(__file__).parents[4]
 
 
 @pytest.mark.filterwarnings("ignore:during the frame times")
@@ -198,44 +191,3 @@ def test_a_case_that_ends_its_process_is_stored_as_failed_and_the_rest_goes_on(s
     assert cause.startswith("its process died 3 times: killed by SIGKILL")
     runs, _ = load_runs(tmp_path / "results", study)
     assert [run.record.status for run in runs] == [Status.FAILED, Status.OK]
-
-
-@contextmanager
-def running(words, folder, path=ROOT):
-    """A program of this Python, with the packages below `path`, until the end."""
-    environment = {**os.environ, "PYTHONPATH": str(path)}
-    with open(folder / "log", "ab") as log:
-        process = subprocess.Popen([sys.executable, "-m", *words], cwd=folder, env=environment, stdout=log, stderr=log)
-    try:
-        yield process
-    finally:
-        process.kill()
-        process.wait()
-
-
-@pytest.mark.campaign
-def test_other_code_is_refused_by_name_and_a_scheduler_that_dies_is_one_sentence(tmp_path):
-    """One scheduler, to whom first a worker with edited code comes, then a good one."""
-    file, edited, results = tmp_path / "file.json", tmp_path / "edited", tmp_path / "results"
-    for package in ("massspring", "reference_fem", "studies"):
-        shutil.copytree(ROOT / package, edited / package, ignore=shutil.ignore_patterns("__pycache__"))
-    with open(edited / "massspring" / "run" / "simulation.py", "a") as source:
-        source.write("\nEDITED = True\n")
-    worker = ["studies", "worker", "--scheduler-file", str(file), "--name"]
-    options = ["--port", "0", "--no-dashboard", "--scheduler-file", str(file), "--host", "127.0.0.1"]
-    with running(["distributed.cli.dask_scheduler", *options], tmp_path) as scheduler:
-        address = address_in(file)
-        with running([*worker, "another"], edited, edited), pytest.raises(StudyError) as stop:
-            swept(results, tiny_study(), address, patience=60.0)
-        assert "worker another differs in the code of organbench; put the same version there" in str(stop.value)
-        assert not (results / "tiny").exists(), "nothing has run"
-
-        class Killer(Silent):
-            def advance(self, what, note):
-                super().advance(what, note)
-                scheduler.kill()
-
-        gone = pytest.raises(StudyError, match=r"no longer answers.*run the same command to continue")
-        with running([*worker, "good"], tmp_path), gone, engine_at(address, 60.0) as engine:
-            run_studies(results, [tiny_study()], engine, Killer())
-    assert len(list((results / "tiny").glob("*.h5"))) >= 1, "what is finished stays"

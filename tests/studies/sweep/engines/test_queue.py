@@ -3,6 +3,7 @@
 import os
 import re
 import shutil
+import sys
 import time
 from pathlib import Path
 
@@ -10,6 +11,8 @@ import pytest
 from dask import config
 
 from studies.base.errors import StudyError
+from studies.sweep.engines.choose import executor_for
+from studies.sweep.engines.cluster import Cluster
 from studies.sweep.engines.queue import (
     QUEUES,
     Settings,
@@ -19,6 +22,7 @@ from studies.sweep.engines.queue import (
     scheduler_with_workers,
 )
 from studies.sweep.engines.tls import make_key
+from studies.sweep.local import Local
 
 ROOT = Path(__file__).parents[4]
 ONE = "from tests.studies.tiny import tiny_case, tiny_study\nSTUDY = tiny_study(cases=(tiny_case(),))\n"
@@ -167,6 +171,7 @@ def script(folder, **changes):
     ("kind", "directives"),
     [
         ("slurm", {"#SBATCH -p short", "#SBATCH --cpus-per-task=16", "#SBATCH --mem=30G", "#SBATCH -t 02:30:00"}),
+        ("slurm", {"#SBATCH --mem=30G", "#SBATCH --account=surgery"}),  # 2 GB for each process
         ("pbs", {"#PBS -q short", "#PBS -l select=1:ncpus=16:mem=30GB", "#PBS -l walltime=02:30:00"}),
         ("sge", {"#$ -q short", "#$ -pe smp 16", "#$ -l h_vmem=2000M", "#$ -l h_rt=02:30:00"}),
         ("lsf", {"#BSUB -q short", "#BSUB -n 16", '#BSUB -R "span[hosts=1]"', "#BSUB -W 02:30"}),
@@ -189,7 +194,36 @@ def test_every_queueing_system_is_tried():
     assert {kind for kind, _ in mark.args[1]} == set(QUEUES)
 
 
-def test_a_job_script_has_no_time_where_none_is_given(tmp_path):
-    lines = script(tmp_path, kind="slurm", hours=None, memory_gb=None, options=("--account=surgery",))
-    assert not [line for line in lines if line.startswith("#SBATCH -t")]
-    assert {"#SBATCH --mem=30G", "#SBATCH --account=surgery"} <= set(lines), "2 GB for each process"
+def chosen(on, jobs=2):
+    return executor_for(on, jobs, Path("results"), print)
+
+
+def test_words_say_where_jobs_run(tmp_path):
+    file = tmp_path / "slurm.yaml"
+    file.write_text("kind: slurm\nworkers: 8\nprocesses: 16\n")
+    assert [chosen(""), chosen("local", 3), chosen("local:4")] == [Local(2), Local(3), Local(4)]
+    there, array = chosen("tcp://127.0.0.1:8786"), chosen(str(file))
+    assert isinstance(there, Cluster) and isinstance(array, Cluster) and array.to_come == 8 * 16
+
+
+ELSEWHERE = {
+    "give the number of processes, as local:4": "local:none",
+    "give the number of processes": "local:0",
+    "give local:N, an address as tcp://HOST:8786, or a FILE.yaml": "slurm",
+    "there is no file nowhere.yaml; docs/cluster.md shows how to write one": "nowhere.yaml",
+}
+
+
+@pytest.mark.parametrize("words", ELSEWHERE)
+def test_other_words_are_refused(words):
+    with pytest.raises(StudyError) as problem:
+        chosen(ELSEWHERE[words])
+    assert words in str(problem.value)
+
+
+def test_a_missing_package_is_named(monkeypatch):
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    for name in ("cluster", "queue", "worker"):
+        monkeypatch.delitem(sys.modules, f"studies.sweep.engines.{name}", raising=False)
+    with pytest.raises(StudyError, match=r"needs the extra `cluster`, which is not installed: pip install"):
+        chosen("tcp://127.0.0.1:8786")

@@ -1,14 +1,17 @@
 """Conditions that a worker meets before it gets a job, and what it is asked to do."""
 
+import os
+import pickle
 from functools import partial
 from pathlib import Path
-from threading import Timer
+from threading import Lock, Timer
 
 import psutil
 import pytest
 
 from studies.base.errors import StudyError
-from studies.sweep.engines.requests import check_for, identity, time_study, wait_until_seen
+from studies.sweep.engines.requests import check_for, identity, prepare, time_study, wait_until_seen
+from studies.sweep.engines.worker import JobPlugin
 from tests.studies.tiny import tiny_case, tiny_study
 
 
@@ -69,3 +72,30 @@ def test_files_of_other_machines_are_waited_for(tmp_path):
 def test_frame_times_are_those_that_this_machine_lacks(results, monkeypatch):
     monkeypatch.setattr(psutil, "cpu_percent", lambda seconds: 25.0)
     assert time_study(results, tiny_study(cases=(tiny_case(timed=True),)), None) == (0, 0.25)
+
+
+def deadly():
+    """A check that ends its process."""
+    os._exit(3)
+
+
+@pytest.mark.parametrize(
+    ("content", "lethal", "fault"),
+    [
+        (b"x = 1", False, ""),
+        (b"x = 1", True, "cannot start a process for organbench: it ended with exit code 3"),
+        (b"import nowhere", False, "cannot begin: mine.py cannot be loaded: "),
+    ],
+)
+def test_a_worker_whose_process_fails_is_unfit(tmp_path, content, lethal, fault):
+    (tmp_path / "mine.py").write_bytes(content)
+    preparation = partial(prepare, str(tmp_path), (("mine.py", content),))
+    with check_for(tmp_path, ()) as check:
+        plugin = JobPlugin("session", {}, pickle.dumps(preparation), pickle.dumps(deadly if lethal else check))
+        plugin.lock, plugin.children = Lock(), []
+        try:
+            said = plugin.fault()
+        finally:
+            for child in plugin.children:
+                child.end()
+    assert said.startswith(fault) and bool(said) == bool(fault)
