@@ -80,15 +80,38 @@ def test_measuring_time_changes_no_physics():
     assert tiny_case(timed=True).key == tiny_case(timed=False).key
 
 
+NAMES = {
+    "tetrahedral-550-implicit_volume-dt0.5": {},
+    "tetrahedral-550-free-dt2ms-uniform-k4": {
+        "body": TetrahedralBody(law="uniform", stiffness=4.0),
+        "method": Free(),
+        "dt": 2e-3,
+    },
+    "surface-550-free-dt0.5-w1_0.5_0.25_1": {"body": SurfaceBody(weights=(1.0, 0.5, 0.25, 1.0)), "method": Free()},
+    "tetrahedral-550-implicit_volume-dt0.5-graded": {"body": TetrahedralBody(graded=True)},
+    "quadratic-800-implicit_volume-dt0.5-graded-stiffness_mass": {
+        "body": QuadraticBody(800, graded=True, mass="stiffness")
+    },
+    "tetrahedral-550-implicit_volume-dt0.5-virtual_nodes": {"body": TetrahedralBody(cut="virtual")},
+    "tetrahedral-550-element-dt0.5-bulk_modulus1e+06-hard": {"method": Element(bulk_modulus=1e6, hard=True)},
+    "tetrahedral-550-xpbd-dt0.5-whole-iterations2": {"method": Xpbd("whole", iterations=2)},
+    "tetrahedral-550-xpbd-dt0.5": {"method": Xpbd()},
+}
+SERIES = {
+    "graded quadratic, masses by stiffness": QuadraticBody(800, graded=True, mass="stiffness"),
+    "graded tetrahedral, nodal volumes": TetrahedralBody(volumes="nodal", graded=True),
+    "tetrahedral, virtual nodes": TetrahedralBody(cut="virtual"),
+}
+
+
 def test_names_are_readable_and_distinct_within_a_study():
     for study in STUDIES:
         names = [case.name for case in study.cases]
         assert len(set(names)) == len(names)
-    assert Case(SCENES[0]).name == "ball_squeeze-tetrahedral-550-implicit_volume-dt0.5"
-    other = Case(SCENES[0], TetrahedralBody(law="uniform", stiffness=4.0), Free(), dt=2e-3)
-    assert other.name == "ball_squeeze-tetrahedral-550-free-dt2ms-uniform-k4"
-    weighted = Case(SCENES[0], SurfaceBody(weights=(1.0, 0.5, 0.25, 1.0)), Free())
-    assert weighted.name == "ball_squeeze-surface-550-free-dt0.5-w1_0.5_0.25_1"
+    assert {Case(SCENES[0], **settings).name: settings for settings in NAMES.values()} == {
+        f"ball_squeeze-{name}": settings for name, settings in NAMES.items()
+    }
+    assert {body.series: body for body in SERIES.values()} == SERIES
 
 
 @pytest.mark.parametrize(
@@ -119,18 +142,6 @@ def test_a_recipe_of_release_0_3_is_read(kind, more):
     if kind != "tetrahedral":
         with pytest.raises(StudyError, match=f"a {kind} body has no setting 'law'"):
             recipe_from_dict(old | {"law": "uniform"})
-
-
-def test_grading_and_masses_stand_in_names_and_series():
-    filled = Case(SCENES[0], TetrahedralBody(graded=True))
-    assert filled.name == "ball_squeeze-tetrahedral-550-implicit_volume-dt0.5-graded"
-    body = QuadraticBody(800, graded=True, mass="stiffness")
-    assert Case(SCENES[0], body).name == "ball_squeeze-quadratic-800-implicit_volume-dt0.5-graded-stiffness_mass"
-    assert body.series == "graded quadratic, masses by stiffness"
-    assert TetrahedralBody(volumes="nodal", graded=True).series == "graded tetrahedral, nodal volumes"
-    virtual = Case(SCENES[0], TetrahedralBody(cut="virtual"))
-    assert virtual.name == "ball_squeeze-tetrahedral-550-implicit_volume-dt0.5-virtual_nodes"
-    assert virtual.body.series == "tetrahedral, virtual nodes"
 
 
 @pytest.mark.parametrize(
@@ -192,12 +203,6 @@ def test_a_method_of_release_0_3_is_read():
     data = json.loads(Case(SCENES[0]).key)
     del data["method"]["settings"]["recovers"]
     assert case_from_json(json.dumps(data)) == Case(SCENES[0])
-
-
-def test_settings_of_a_method_that_are_not_its_defaults_stand_in_the_name():
-    assert Case(SCENES[0], method=Element(bulk_modulus=1e6, hard=True)).name.endswith("-bulk_modulus1e+06-hard")
-    assert Case(SCENES[0], method=Xpbd("whole", iterations=2)).name.endswith("-whole-iterations2")
-    assert Case(SCENES[0], method=Xpbd()).name == "ball_squeeze-tetrahedral-550-xpbd-dt0.5"
 
 
 @pytest.mark.parametrize("text", ["", "{", "[]", "3", "null", '"case"', "{}", '{"scene": 3}'])

@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from massspring import Free, ImplicitVolume, Xpbd
+from massspring import ImplicitVolume
 from studies.base.errors import StudyError
 from studies.catalog import STUDIES
 from studies.runs.case import Case

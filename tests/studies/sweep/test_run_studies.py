@@ -20,11 +20,7 @@ from studies.sweep.local import Local
 from studies.sweep.run_studies import run_studies
 from studies.sweep.standings import failed, standings, warnings_of
 from tests.studies.octant import SCENE
-from tests.studies.tiny import Silent, diverging_case, tiny_case, tiny_study
-
-
-def content(folder):
-    return {path.name: path.read_bytes() for path in folder.iterdir()}
+from tests.studies.tiny import Silent, content, diverging_case, tiny_case, tiny_study
 
 
 def counts(root, study):
@@ -41,16 +37,11 @@ def test_everything_once(finished_sweep):
     assert [run.timing is not None for run in runs] == [True, True, False]
 
 
-def test_a_second_sweep_does_nothing(results):
-    before, watched = content(results / "tiny"), Silent()
-    assert run_studies(results, [tiny_study()], 1, watched) == 0
-    assert watched.begun == []
-    assert content(results / "tiny") == before
-
-
-def test_one_new_case_is_one_piece(results):
+def test_a_second_sweep_does_nothing_and_one_new_case_is_one_piece(results):
     before = content(results / "tiny")
     study, watched = tiny_study(), Silent()
+    assert (run_studies(results, [study], 1, watched), watched.begun) == (0, [])
+    assert content(results / "tiny") == before
     more = replace(study, cases=(*study.cases, tiny_case(dt_fraction=0.4)))
     assert run_studies(results, [more], 1, watched) == 1
     assert watched.begun == [("physics", 1)]

@@ -171,7 +171,6 @@ def script(folder, **changes):
     ("kind", "directives"),
     [
         ("slurm", {"#SBATCH -p short", "#SBATCH --cpus-per-task=16", "#SBATCH --mem=30G", "#SBATCH -t 02:30:00"}),
-        ("slurm", {"#SBATCH --mem=30G", "#SBATCH --account=surgery"}),  # 2 GB for each process
         ("pbs", {"#PBS -q short", "#PBS -l select=1:ncpus=16:mem=30GB", "#PBS -l walltime=02:30:00"}),
         ("sge", {"#$ -q short", "#$ -pe smp 16", "#$ -l h_vmem=2000M", "#$ -l h_rt=02:30:00"}),
         ("lsf", {"#BSUB -q short", "#BSUB -n 16", '#BSUB -R "span[hosts=1]"', "#BSUB -W 02:30"}),
@@ -192,6 +191,12 @@ def test_a_job_script_asks_for_what_the_file_says(tmp_path, kind, directives):
 def test_every_queueing_system_is_tried():
     (mark,) = test_a_job_script_asks_for_what_the_file_says.pytestmark
     assert {kind for kind, _ in mark.args[1]} == set(QUEUES)
+
+
+def test_a_job_script_has_no_time_where_none_is_given(tmp_path):
+    lines = script(tmp_path, kind="slurm", hours=None, memory_gb=None, options=("--account=surgery",))
+    assert not [line for line in lines if line.startswith("#SBATCH -t")]
+    assert {"#SBATCH --mem=30G", "#SBATCH --account=surgery"} <= set(lines), "2 GB for each process"
 
 
 def chosen(on, jobs=2):
