@@ -1,8 +1,12 @@
 """The command line: words in, tables and charts out."""
 
+import os
+import pkgutil
 import re
+import subprocess
 import sys
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -12,7 +16,9 @@ from typer.testing import CliRunner
 from massspring import METHODS
 from studies.catalog import STUDIES
 from studies.cli import app as cli
+from studies.cli import commands
 from studies.cli.commands.show import SHOWN
+from studies.cli.groups import FORMER, GROUPS
 from studies.geometry.organs import SHAPES
 from studies.metrics.metrics import METRICS
 from studies.metrics.table import study_table
@@ -61,6 +67,7 @@ def test_a_smoke_run_is_kept_apart(organbench, tiny_file, results):
     code, out, _ = organbench("run", tiny_file, "--smoke", "--results", results, "--jobs", 1)
     assert code == 0
     assert str(results / "smoke" / "tiny") in out
+    assert "3 cases: 2 ok, 1 diverged" in organbench("show", tiny_file, "--results", results, "--smoke")[1]
     after = content(results)
     assert before.items() <= after.items()
     assert all(path.parts[0] == "smoke" for path in after.keys() - before.keys())
@@ -191,19 +198,6 @@ def test_replay_and_its_exit_code(organbench, results):
     assert "another machine" in out
 
 
-def test_only_failed_leaves_the_rest(organbench, tiny_file, results):
-    before = content(results / "tiny")
-    path = case_path(results, "tiny", tiny_case())
-    write_record(path, replace(read_record(path), fingerprint="0"))
-    code, out, _ = organbench("run", tiny_file, "--results", results, "--only", "failed")
-    assert code == 0
-    assert "tiny: nothing ran" in out
-    code, out, _ = organbench("run", tiny_file, "--results", results, "--only", "failed, stale", "--jobs", 1)
-    assert "tiny: 1 case ran" in out
-    after = content(results / "tiny")
-    assert all(after[name] == data for name, data in before.items() if name.name != path.name and name.suffix == ".h5")
-
-
 def test_safe_dt_predicts_and_verifies(organbench):
     code, out, err = organbench("safe-dt", "ball_squeeze", "--nodes", 60)
     assert code == 0
@@ -213,3 +207,43 @@ def test_safe_dt_predicts_and_verifies(organbench):
     assert re.search(r"bracket +stable at [\d.]+ ms, diverges at [\d.]+ ms", out)
     assert out.strip().endswith("verified")
     assert "not verified" not in out
+
+
+LINES = {command.name for command in cli.app.registered_commands}
+ROOT = Path(__file__).parents[3]
+
+
+def test_every_module_of_a_command_is_listed_in_a_short_group():
+    modules = {name for _, name, _ in pkgutil.iter_modules(commands.__path__)}
+    assert {name.replace("-", "_") for name in LINES} == modules
+    assert max(map(len, GROUPS.values())) <= 7
+    shown = CliRunner().invoke(cli.app, [], env={"COLUMNS": "80"}).output
+    assert [group for group in GROUPS if f"─ {group} ─" not in shown] == []
+    assert [name for name in LINES if not re.search(rf"^│ {name} +[A-Z]", shown, re.M)] == []
+
+
+@pytest.mark.parametrize("name", FORMER)
+def test_a_former_command_is_refused_with_what_replaced_it(refused, name):
+    sentence = refused(name, "--help")
+    assert f"the command '{name}' {FORMER[name]}" in sentence and name not in LINES
+    named = [words.split()[1] for words in sentence.split("`")[1::2] if words.startswith("organbench ")]
+    assert set(named) <= LINES
+
+
+@pytest.mark.parametrize(
+    ("words", "offered"),
+    [
+        (("prof",), ["profile"]),
+        (("run", "volume_l"), ["volume_loss"]),
+        (("advise", "liver_pre"), ["liver_press"]),
+        (("run", "--sm"), ["--smoke"]),
+        (("nothing", "prof"), ["profile"]),
+    ],
+    ids=" ".join,
+)
+def test_a_shell_is_offered_commands_names_and_options(words, offered):
+    line = {"COMP_WORDS": " ".join(("organbench", *words)), "COMP_CWORD": str(len(words))}
+    env = {**os.environ, **line, "_ORGANBENCH_COMPLETE": "complete_bash", "PYTHONPATH": str(ROOT)}
+    program = "import sys; sys.argv = ['organbench']; from studies.__main__ import main; main()"
+    done = subprocess.run([sys.executable, "-c", program], env=env, capture_output=True, text=True, check=False)
+    assert (done.stdout.split(), done.stderr) == (offered, "")

@@ -4,17 +4,20 @@ import errno
 import io
 import json
 import os
+import re
 import subprocess
 import sys
 import tempfile
 from dataclasses import replace
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 
 from studies.cli import app as cli
 from studies.cli.commands import list as list_command
+from studies.metrics.timing.cases import timing_file
 from studies.runs.current import case_path
 from studies.store.paths import record_files
 from studies.store.record import Status, read_record, write_record
@@ -211,3 +214,44 @@ def test_lines_that_the_output_does_not_take_at_the_end_are_bad_input(monkeypatc
     monkeypatch.setattr(sys, "stdout", Full())
     assert cli.flushed(0) == 2 and "could not be written" in capsys.readouterr().err
     assert cli.flushed(1) == 1
+
+
+@pytest.mark.parametrize("command", ["show", "replay"])
+def test_a_file_that_is_no_result(refused, finished_sweep, tmp_path, command):
+    path = tmp_path / "odd.h5"
+    path.write_bytes(case_path(finished_sweep, "tiny", tiny_case()).read_bytes()[:3000])
+    assert str(path) in refused(command, path)
+
+
+def test_a_study_of_damaged_files_alone_is_refused(refused, tiny_file, results):
+    for path in record_files(results, "tiny"):
+        path.write_bytes(b"damaged")
+    sentence = refused("table", tiny_file, "--results", results)
+    assert f"all stored records of {tiny_file} are damaged (3); `organbench run" in sentence
+
+
+@pytest.mark.parametrize("fault", ["cut off", "the key", "a field", "a number", "the timing"])
+def test_one_damaged_file_costs_one_case(organbench, tiny_file, results, fault):
+    path = case_path(results, "tiny", tiny_case())
+    whole = path.read_bytes()
+    if fault == "cut off":
+        path.write_bytes(whole[:3000])
+    elif fault == "the key":
+        place = whole.index(b'"dt_fraction"')
+        path.write_bytes(whole[:place] + b"#" + whole[place + 1 :])
+    elif fault == "the timing":
+        path = timing_file(results, "tiny", tiny_case(timed=True))
+        path.write_bytes(path.read_bytes()[:-1])
+    else:
+        with h5py.File(path, "r+") as file:
+            if fault == "a field":
+                del file["volume"]
+            else:
+                file["volume"][-1, 0] *= 1.5
+    code, out, err = organbench("table", tiny_file, "--results", results)
+    assert code == 0 and path.name in err and len(err.splitlines()) == 1
+    rows = [line for line in out.splitlines() if line.startswith(("  free ", "  implicit_volume "))]
+    assert len(rows) == (3 if fault == "the timing" else 2)
+    code, out, _ = organbench("show", tiny_file, "--results", results)
+    assert code == 0 and (fault == "the timing" or {"1 ok", "1 stale"} < set(re.findall(r"\d \w+", out)))
+    assert ("its file is damaged" in out) == (fault != "the timing")

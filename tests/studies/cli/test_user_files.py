@@ -1,9 +1,12 @@
 """A FILE.py with STUDY, with SCENE, or with both: every command that takes a study or a scene takes it."""
 
+import glob
 import json
+import re
 import shlex
 import zipfile
 from html import unescape
+from pathlib import Path
 
 import pytest
 
@@ -112,13 +115,6 @@ def test_a_case_is_named_by_a_part_of_its_name(organbench, refused, write, tmp_p
     assert f"did you mean {names[0]!r}" in refused("run", path, "--case", names[0] + "x", "--results", results)
 
 
-def test_status_knows_smoke_runs(organbench, write, tmp_path):
-    path, results = write("STUDY = tiny_study(cases=(tiny_case(),))\n"), tmp_path / "results"
-    assert organbench("run", path, "--smoke", "--results", results, "--jobs", 1)[0] == 0
-    assert organbench("show", path, "--results", results, "--smoke")[1].startswith("tiny: 1 case: 1 ok\n")
-    assert "tiny: 1 case: 1 missing" in organbench("show", path, "--results", results)[1]
-
-
 def test_a_study_that_the_page_cannot_show_is_named(organbench, write, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("studies.cli.commands.report.STUDIES", ())
@@ -137,3 +133,39 @@ def test_a_study_that_the_page_cannot_show_is_named(organbench, write, tmp_path,
         assert (
             "tiny is not on the page; `organbench report FILE.py`, with the file that defines the study, adds it" in err
         )
+
+
+PAGE = Path(__file__).parents[3] / "docs" / "first-study.md"
+PART = re.compile(
+    r"```(?P<kind>python|text)\n(?P<block>.*?)```|^    organbench (?P<command>[^\n]*)$|"
+    r"Change `(?P<old>[^`]+)` to `(?P<new>[^`]+)`",
+    re.DOTALL | re.MULTILINE,
+)
+
+
+@pytest.mark.campaign
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore::UserWarning")
+def test_the_tutorial_is_followed(organbench, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "100")
+    file, printed, count = tmp_path / "first.py", "", 0
+    for part in re.finditer(PART, PAGE.read_text(encoding="utf-8")):
+        if part["command"]:
+            words = [word for text in shlex.split(part["command"]) for word in glob.glob(text) or [text]]
+            code, out, err = organbench(*words)
+            assert code == 0, f"organbench {part['command']}: {out}{err}"
+            printed += out + err
+        elif part["old"]:
+            assert file.read_text().count(part["old"]) == 1
+            file.write_text(file.read_text().replace(part["old"], part["new"]))
+        elif part["kind"] == "text":
+            for line in part["block"].splitlines():
+                assert line.rstrip() in printed, f"not printed: {line}"
+            printed, count = "", count + 1
+        elif file.exists():
+            first, rest = file.read_text().split("CHARTS", 1)
+            file.write_text(f"{first}{part['block']}CHARTS{rest}")
+        else:
+            file.write_text(part["block"])
+    assert count == 5 and (tmp_path / "results" / "first" / "volume.png").is_file()

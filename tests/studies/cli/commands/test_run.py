@@ -112,13 +112,9 @@ def test_a_study_that_expects_failures_is_not_held_up(organbench, file_of, tmp_p
     assert (code, err) == (0, "") and "1 case would run" in out
 
 
-def test_a_dry_run_with_a_missing_mesh_file_is_refused(refused, tmp_path):
-    file = tmp_path / "mine.py"
-    file.write_text(
-        "from studies import SurfaceBody\nfrom tests.studies.tiny import *\n"
-        "STUDY = tiny_study(cases=(tiny_case(scene=file_scene('none.stl'), body=SurfaceBody()),))\n"
-    )
-    assert "there is no mesh file none.stl" in refused("run", file, "--dry-run", "--results", tmp_path / "results")
+def test_a_dry_run_with_a_missing_mesh_file_is_refused(refused, file_of, tmp_path):
+    path = file_of(f"{OWN}STUDY = tiny_study(cases=(tiny_case(scene=file_scene('none.stl')),))\n")
+    assert "there is no mesh file none.stl" in refused("run", path, "--dry-run", "--results", tmp_path / "results")
 
 
 def changed(before, after):
