@@ -33,7 +33,7 @@ def hollow(mesh_cache):
     return organ("ball", 150, parameters={"radius": RADIUS, "wall": 0.01})
 
 
-@pytest.mark.parametrize("share", [-0.55, -0.1, 0.3, 0.7])
+@pytest.mark.parametrize("share", [-0.55, 0.3])
 def test_half_a_body_and_its_cut_face_enclose_what_is_left(share):
     normal = np.array([0.48, 0.6, 0.64])
     height = share * RADIUS
@@ -92,22 +92,13 @@ def middle(mesh):
     return normal, float((mesh.points @ normal).mean())
 
 
-def words(figure):
-    return "\n".join(text.get_text() for axes in figure.axes for text in (*axes.texts, axes.title))
-
-
-def test_springs_are_those_of_the_body(tmp_path):
+def test_springs_are_those_of_the_body():
     mesh = octahedron(tetrahedra=np.zeros((0, 4), int), points=POINTS[:6])
     figure = organ_springs.figure({"ball": mesh})
     body = organ_springs.body_of(mesh)
-    text = words(figure)
-    for axes, (title, (kind, _)) in zip(figure.axes[1:], organ_springs.PANELS.items(), strict=True):
+    for axes, (kind, _) in zip(figure.axes[1:], organ_springs.PANELS.values(), strict=True):
         lines = axes.collections[0].get_segments()
         assert len(lines) == (body.springs.kind == kind).sum() > 0
         drawn = sorted(np.linalg.norm(line[1] - line[0]) for line in map(np.asarray, lines))
         ends = organs.FRONT.see(body.rest)[body.springs.ends[body.springs.kind == kind].astype(int)][:, :, :2]
         assert drawn == pytest.approx(sorted(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)))
-        assert f"{title.capitalize()}\n{len(lines)}" in text
-    assert "6 nodes, 8 triangles" in text
-    organ_springs.draw_organ_springs({"ball": mesh}, tmp_path / "a.png")
-    assert (tmp_path / "a.png").stat().st_size > 2000

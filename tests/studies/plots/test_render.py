@@ -12,7 +12,8 @@ from massspring import METHODS
 from studies.plots import volume_history
 from studies.plots.style.page import finish, page, spread_out
 from studies.plots.style.render import LIGHT, Camera, draw_surface, shade, uniform, vertex_normals
-from studies.plots.style.style import method_colour, styled
+from studies.plots.style.style import BLUE, STATUS_LOOKS, VERMILLION, method_colour, styled
+from studies.store.record import Status
 from tests.studies.plots.made_up import POINTS, RADIUS, TRIANGLES, run
 
 FRONT = Camera(azimuth=-90.0, elevation=0.0)
@@ -70,21 +71,20 @@ def test_labels_keep_their_order_and_their_distance():
 
 
 @styled
-@pytest.mark.parametrize("letters", [5, 30, 60])
+@pytest.mark.parametrize("letters", [5, 60])
 def test_a_legend_stays_on_the_page_and_over_its_notes(letters):
     figure = page(8.0, 3.0)
     figure.subplots()
     finish(figure, "Title", [Patch(label="w" * letters) for _ in range(7)], ["n" * 400], columns=4)
     FigureCanvasAgg(figure).draw()
     box, note = figure.legends[0].get_window_extent(), figure.texts[-1].get_window_extent()
-    assert box.x0 >= 0
-    assert box.x1 <= figure.bbox.width
-    assert note.y1 <= box.y0
-    assert note.y0 >= 0
+    assert box.x0 >= 0 and box.x1 <= figure.bbox.width and note.y0 >= 0 and note.y1 <= box.y0
 
 
-def test_every_method_has_its_own_colour():
-    assert len({method_colour(method.name) for method in METHODS}) == len(METHODS)
+def test_every_method_and_every_status_has_a_look_of_its_own():
+    assert len({method_colour(method.name) for method in METHODS}) == len(METHODS) and set(STATUS_LOOKS) == set(Status)
+    colours, markers = ({look[k] for look in STATUS_LOOKS.values()} for k in (0, 1))
+    assert len({*colours, BLUE, VERMILLION}) == len(Status) + 2 and len(markers) == len(Status)
 
 
 def test_the_users_own_settings_change_nothing(tmp_path):
