@@ -27,6 +27,7 @@ from studies.runs.current import case_path
 from studies.scene.library import CUT, SCENES
 from studies.store.record import Field, read_record, write_record
 from studies.sweep.load import load_runs
+from tests.campaigns import campaign
 from tests.studies.tiny import content, diverging_case, tiny_case, tiny_study
 
 SHAPE = "the body at rest does not keep the shape of its organ"
@@ -233,9 +234,8 @@ def test_a_former_command_is_refused_with_what_replaced_it(refused, name):
 @pytest.mark.parametrize(
     ("words", "offered"),
     [
-        (("prof",), ["profile"]),
         (("run", "volume_l"), ["volume_loss"]),
-        (("advise", "liver_pre"), ["liver_press"]),
+        campaign(("advise", "liver_pre"), ["liver_press"]),
         (("run", "--sm"), ["--smoke"]),
         (("nothing", "prof"), ["profile"]),
     ],

@@ -1,6 +1,7 @@
 """What metrics say of made-up runs of a body that is cut in two after the first of four frames."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ import pytest
 from massspring.body.opening import opened
 from studies.geometry import HalfSpace
 from studies.geometry.mesh.organ_mesh import boundary_triangles
+from studies.metrics.metrics import opening_error
 from studies.reference.solution import Boundary
 from studies.scene.cut import Cut
 from tests.studies.made_up_run import CELLS, EDGE, POINTS, SCENE, of, reference, run
@@ -104,3 +106,16 @@ def test_faces_of_a_cut_are_recognised_in_a_rounded_reference():
     facets = boundary_triangles(opening.cells.astype(int))
     outside = run(**cut_run(TARGET))._outside(POINTS[opening.parent] + noise, facets)
     assert len(facets) - len(outside) == 2 * faces == 16
+
+
+def test_of_several_cuts_the_opening_of_the_worse_counts():
+    truth = np.tile([0.0, 0.0, 2.0], (4, 1))
+    made_up = SimpleNamespace(
+        reference=SimpleNamespace(opening=lambda x: truth),
+        fields=SimpleNamespace(rest=np.zeros((8, 3))),
+        cut_pairs=np.arange(8).reshape(4, 2),
+        cut_of_pairs=np.array([0, 0, 1, 1]),
+        cut_weights=np.array([1.0, 2.0, 3.0, 4.0]),
+        opening=truth * np.array([1.01, 0.99, 1.1, 0.9])[:, None],
+    )
+    assert opening_error(made_up) == pytest.approx(10.0)

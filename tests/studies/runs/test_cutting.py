@@ -243,6 +243,14 @@ def test_a_wall_that_is_opened_by_and_by_ends_where_one_opened_at_once_does(shel
 
 
 @pytest.mark.slow
+def test_both_halves_of_a_wall_keep_their_volumes():
+    scene = changed(SHELL_OPENED, within=None)
+    made, history = opened(scene, "wall", mesh_for(scene, NODES, even=True))
+    assert made.body.kept.count == 2
+    np.testing.assert_allclose(history.volume[-1], made.body.rest_volumes, rtol=1e-6)
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize(("at", "energy"), [((CUT_AT, SECOND_AT), 1e-8), campaign((SECOND_AT, CUT_AT), 1e-10)])
 @pytest.mark.parametrize(
     "body",
