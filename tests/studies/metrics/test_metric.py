@@ -42,7 +42,7 @@ def test_names_are_unique_and_studies_use_known_ones():
 @pytest.mark.parametrize("entry", METRICS, ids=lambda entry: entry.name)
 def test_every_metric_is_a_number_somewhere(entry):
     """A metric that no scene allows would be an empty column in every table."""
-    # Of many checkpoints: tests/studies/reference/test_ringing.py; of obstacles: tests/studies/metrics/test_contact.py.
+    # Of many checkpoints: tests/studies/reference/test_ringing.py; of obstacles: tests/studies/metrics/test_metrics.py.
     if entry.quantity == "frequency" or entry.name.startswith("contact"):
         return
     # Of scenes with a cut: tests/studies/runs/test_cutting.py.

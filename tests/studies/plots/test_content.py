@@ -57,6 +57,7 @@ def test_force_of_the_reference_holds_when_the_press_stops():
     stop = BALL_SQUEEZE.obstacles[0].path.times[-1]
     assert np.interp([stop, 4.0], path.get_xdata(), path.get_ydata()) == pytest.approx([4.0, 4.0])
     assert list(marks.get_xdata()) == list(BALL_SQUEEZE.checkpoints)
+    assert "−25 %" in words(force_path.figure([run(error=0.25)]))
 
 
 def test_runs_that_did_not_end_ok_are_struck_out_and_named():

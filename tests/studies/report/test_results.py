@@ -19,6 +19,7 @@ from studies.runs.current import case_path
 from studies.store.ledger import Ledger
 from studies.store.machine import machine_id
 from studies.store.record import Status
+from studies.store.tables import write_table
 from studies.sweep import load as sweep_load
 from studies.sweep.load import load_runs
 from tests.studies.tiny import tiny_case, tiny_study
@@ -34,6 +35,12 @@ def test_charts_get_the_runs_and_their_path(finished_sweep, tmp_path):
     study = tiny_study(charts=(Chart("one.png", lambda runs, path: drawn.append((len(runs), path))),))
     paths = draw_charts(tmp_path, study, load_runs(finished_sweep, study)[0])
     assert paths == [tmp_path / "tiny" / "one.png"] and drawn == [(3, paths[0])] and paths[0].parent.is_dir()
+
+
+def test_a_table_is_read_back_as_it_was(tmp_path):
+    table = pd.DataFrame({"status": ["ok", "diverged"], "force [%]": [1.0 / 3.0, np.nan], "nodes": [150, 2200]})
+    again = pd.read_csv(write_table(tmp_path / "new" / "t.csv", table))
+    pd.testing.assert_frame_equal(again, table, rtol=1e-6)
 
 
 def test_report_writes_everything_and_names_what_is_missing(results):
