@@ -5,25 +5,38 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from massspring import quadratic_body, surface_body, tetrahedral_body
+from massspring import Body, quadratic_body, surface_body, tetrahedral_body
 from studies.geometry import organ
 from studies.geometry.organs import make_shape
 from studies.geometry.surface.first_surface import true_volume
 from studies.meshing.bounds import SHAPE
 from studies.meshing.rest_surface import LUMEN, OUTER, RestSurface, rest_surfaces
 from studies.meshing.true_surface import shape_errors, true_surface
+from studies.metrics.run import Run
 from studies.metrics.table import metric
 from studies.reference.solution import Boundary, Solution
-from studies.runs.recipes import TetrahedralBody
+from studies.runs.case import Case
+from studies.runs.recipes import BODIES, TetrahedralBody
+from studies.scene.library.ball_clamped import BALL_CLAMPED
 from studies.scene.library.ball_squeeze import RADIUS as BALL
 from studies.scene.scene import Organ
 from studies.store.record import Field
 from tests.massspring.conftest import SOFT, icosphere
 from tests.massspring.quadratic import RADIUS, ball_mesh
+from tests.studies import made_up_run
 from tests.studies.made_up_run import EDGE, POINTS, SHIFT, TRIANGLES, of, reference, run
-from tests.studies.metrics.bodies import ball_run
 from tests.studies.octant import SCENE as OCTANT
 from tests.studies.tiny import cube, file_scene, write_obj
+
+
+def ball_run(body: Body, rest: np.ndarray | None = None, kind: str = "quadratic") -> Run:
+    """A run of a body of a ball that stays where it is, at `rest` (n, 3) [m] in place of its own."""
+    points = body.rest if rest is None else rest
+    values = {"rest": points, "snapshots": points[None], "mass": body.mass}
+    values |= {"triangles": body.triangles, "tetrahedra": body.tetrahedra}
+    scene = replace(BALL_CLAMPED, organ=Organ("ball", {"radius": RADIUS}))
+    return replace(made_up_run.run(values=values, reference=None), case=Case(scene, BODIES[kind]()))
+
 
 DIAGONAL = 2.0 * RADIUS * 3.0**0.5
 
