@@ -298,11 +298,11 @@ def opened(head: str, cell: str, *columns: str) -> tuple:
 
 
 ROWS = [
-    (README, "at most # % off in the study volume_loss; springs alone lose up to # %", lambda: (
+    (README, "with one multiplier it is at most # % off; springs alone lose up to # %", lambda: (
         of(compared(), method=OURS)[VOLUME].max(), of(compared(), method="free")[VOLUME].max())),
     (FINDINGS, "keeps the volume: at most # % are lost, by springs alone up to # %.", lambda: (
         of(compared(), method=OURS)[VOLUME].max(), of(compared(), method="free")[VOLUME].max())),
-    (README, "with one kept volume it is # to # % too small",
+    (README, "with 550 surface nodes, it is # to # % too small",
         lambda: span(of(compared(), method=OURS, body=["tetrahedral", "surface"])[FORCE])),
     (FINDINGS, "tetrahedral bodies is # to # % too small, that of surface bodies # to # %; from # to # nodes the error "
         "grows in # of # cases", lambda: one_volume()[1:]),
@@ -337,7 +337,8 @@ ROWS = [
     (FINDINGS, "Ball of # cm radius and liver of # L, shear modulus # kPa, # surface nodes", lambda: (
         100 * RADIUS, 1e3 * true_volume(make_shape("liver", {})), BALL_SQUEEZE.tissue.shear_modulus / 1e3,
         *rows("volume_loss")["nodes"].unique())),
-    (FINDINGS, "all # methods that keep *one* volume give the same force within # %. They differ in cost, # to # µs a "
+    (FINDINGS, "all # methods that keep *one* volume give the same force within # % of the reference. They differ in "
+        "cost, # to # µs a "
         "step, and in the volume error, # to # %. One volume per tetrahedron locks: the force is # to # % too large.",
         ways),
     (FINDINGS, "at full load is # to # % too small under each of the # laws that allow one volume. One volume per node "
@@ -349,7 +350,7 @@ ROWS = [
             recovered("tetrahedral", method=OURS), rows("stress")["scene"].nunique(), "line",
             recovered("tetrahedral", method="free"), recovered(NODAL, method=OURS),
             recovered(NODAL, method=f"{OURS} recovers"))),
-    (LIMITS, "bodies with flat sides lack # to # % of the", lambda: span(
+    (LIMITS, "our bodies with flat sides lack # to # % of the", lambda: span(
         rows("accuracy").query("method == @OURS and not body.str.contains('quadratic')")["shape_volume [%]"])),
     (LIMITS, "filled stomach** has # times the force of the reference when pressed",
         lambda: (1 + accuracy("stomach_press", "surface", 550, FORCE) / 100,)),
