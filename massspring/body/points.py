@@ -1,7 +1,8 @@
-"""Volumes of quadratic tetrahedra: one per vertex, summed over points inside the elements, and closed surfaces.
+"""Volumes of quadratic tetrahedra, per vertex or per element, summed over points inside them, and closed surfaces.
 
 V_r = Σ_q ρ_rq w_q J_q with J_q = det F_q at the points q of the elements, Σ_r ρ_rq = 1 (docs/theory.md, eq. 8.9):
-with ρ_rq the linear shape function of vertex r it is the pressure space of Taylor and Hood (1973).
+with ρ_rq the linear shape function of vertex r it is the pressure space of Taylor and Hood (1973). Where the four
+corners of an element name one volume, its ρ is 1: a constant pressure in the element.
 """
 
 from dataclasses import dataclass, replace
@@ -44,7 +45,8 @@ def gradients(points: np.ndarray, cells: np.ndarray) -> tuple[np.ndarray, np.nda
 
 @dataclass(frozen=True, eq=False)
 class PointVolumes:
-    """m volumes of k quadratic tetrahedra: one per vertex in ascending order, then closed surfaces such as a lumen."""
+    """m volumes of k quadratic tetrahedra: of vertices, then of the elements that keep their own, each in ascending
+    order, then of closed surfaces such as a lumen."""
 
     cells: np.ndarray
     """VTK's order, (k, 10) uint32."""
@@ -53,25 +55,31 @@ class PointVolumes:
     weight: np.ndarray
     """w_q [m³], (k, 4); their sum is the rest volume."""
     corner_volume: np.ndarray
-    """The volume of each corner of each element, (k, 4)."""
+    """The volume of each corner of each element, (k, 4); one and the same at all corners of an element with its own."""
     closed: Volumes | None = None
     """Further volumes inside closed surfaces of flat triangles."""
 
     @cached_property
-    def vertex_count(self) -> int:
-        """Number of vertices, and of their volumes."""
+    def tissue_count(self) -> int:
+        """Number of volumes of the tissue: of vertices and of elements."""
         return int(self.corner_volume.max()) + 1
+
+    @cached_property
+    def own(self) -> np.ndarray:
+        """The elements that keep a volume of their own, ascending, (e,)."""
+        return np.flatnonzero(np.ptp(self.corner_volume, axis=1) == 0)
 
     @property
     def names(self) -> tuple[str, ...]:
         """m different names."""
-        own = tuple(f"vertex {r}" for r in range(self.vertex_count))
-        return own if self.closed is None else own + self.closed.names
+        vertices = tuple(f"vertex {r}" for r in range(self.tissue_count - len(self.own)))
+        tissue = vertices + tuple(f"element {e}" for e in self.own)
+        return tissue if self.closed is None else tissue + self.closed.names
 
     @property
     def count(self) -> int:
         """m."""
-        return self.vertex_count + (0 if self.closed is None else self.closed.count)
+        return self.tissue_count + (0 if self.closed is None else self.closed.count)
 
     @property
     def highest_node(self) -> int:
@@ -90,7 +98,7 @@ class PointVolumes:
     def measure(self, x: np.ndarray) -> np.ndarray:
         """V_r [m³] at positions `x` (n, 3) [m], (m,)."""
         parts = np.einsum("kq,qr->kr", self.weight * self.jacobians(x), BARYCENTRIC)
-        own = np.bincount(self.corner_volume.ravel(), weights=parts.ravel(), minlength=self.vertex_count)
+        own = np.bincount(self.corner_volume.ravel(), weights=parts.ravel(), minlength=self.tissue_count)
         return own if self.closed is None else np.concatenate([own, self.closed.measure(x)])
 
     def jacobian(self, x: np.ndarray) -> csr_array:
@@ -99,7 +107,7 @@ class PointVolumes:
         entry = np.einsum("kqai,qr->krai", areas, BARYCENTRIC)
         rows = np.broadcast_to(self.corner_volume[:, :, None, None], entry.shape)
         columns = 3 * self.cells.astype(np.int64)[:, None, :, None] + np.arange(3)
-        shape = (self.vertex_count, x.size)
+        shape = (self.tissue_count, x.size)
         own = csr_array((entry.ravel(), (rows.ravel(), np.broadcast_to(columns, entry.shape).ravel())), shape=shape)
         own.sum_duplicates()
         return own if self.closed is None else csr_array(vstack([own, self.closed.jacobian(x)]))
@@ -111,8 +119,8 @@ class PointVolumes:
         return self.weight[:, :, None, None] * np.einsum("kqij,kqaj->kqai", np.stack(columns, axis=-1), self.gradient)
 
     def parts_of(self, triangles: np.ndarray) -> np.ndarray:
-        """Factor of each volume in the volume of the tissue, (m,): 1 for each vertex, 0 for closed surfaces."""
-        return np.r_[np.ones(self.vertex_count), np.zeros(self.count - self.vertex_count)]
+        """Factor of each volume in the volume of the tissue, (m,): 1 in the tissue, 0 for closed surfaces."""
+        return np.r_[np.ones(self.tissue_count), np.zeros(self.count - self.tissue_count)]
 
     def renumbered(self, number: np.ndarray) -> "PointVolumes":
         """The same volumes in the same order, with node i renumbered to `number[i]`, (n,) uint32."""

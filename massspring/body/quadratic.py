@@ -1,8 +1,9 @@
-"""Bodies of quadratic tetrahedra: springs without length between all nodes of an element, one volume per vertex.
+"""Bodies of quadratic tetrahedra: springs without length in every element, a volume per vertex or element.
 
 ½ mu Σ_q w_q |F_q|² = ½ mu xᵀ K x with one constant matrix K_ab = Σ_q w_q ∇N_a·∇N_b, so that its forces are those of
 springs k_ab = −mu K_ab without length (docs/theory.md, eq. 4.9). With the volumes of vertices it is the mixed element
-of Taylor and Hood (1973) for an incompressible neo-Hookean solid.
+of Taylor and Hood (1973) for an incompressible neo-Hookean solid. The pressure of an element with its own volume is
+constant.
 """
 
 from dataclasses import replace
@@ -48,6 +49,7 @@ def quadratic_body(
     lumen: np.ndarray | None = None,
     inertia: Inertia = "lumped",
     contact: Contact = "facets",
+    own_volumes: np.ndarray | None = None,
 ) -> Body:
     """The body of a mesh of quadratic tetrahedra, straight or curved.
 
@@ -55,18 +57,25 @@ def quadratic_body(
     positive volume, as in FACETS, kept beside the tissue. `inertia`: what resists motion, the lumped mass, or
     "stiffness": the total mass shared by the diagonal of K, for scenes in which inertia does not matter (longer steps).
     `contact`: where obstacles touch it, at points inside its facets or at its nodes alone, which is cheaper.
-    Its surface and its tetrahedra are the four flat parts of each facet and the eight of each element. Raises
-    MassSpringError for an element that folds at one of its points or whose parts do.
+    `own_volumes` (k,) bool: the elements that keep their own volume, as where the pressure jumps; the rest keep one per
+    vertex. Its surface and its tetrahedra are the four flat parts of each facet and the eight of each element. Raises
+    MassSpringError for an element that folds at one of its points or whose parts do, and for other `own_volumes`.
     """
     points = checked_points(points)
     cells = checked_indices("cells", cells, 10, len(points))
+    own = np.zeros(len(cells), dtype=bool) if own_volumes is None else np.asarray(own_volumes)
+    if own.shape != (len(cells),) or own.dtype != bool:
+        raise MassSpringError(
+            f"own_volumes is an array of {own.dtype} with shape {own.shape}; give True or False for each of the "
+            f"{len(cells)} elements"
+        )
     slopes, weight = gradients(points, cells)
     _check_folds(points, cells, weight)
     springs = _springs(cells, weight, slopes, material.shear_modulus, len(points))
     mass = material.density * _lumped(cells, weight.sum(axis=1), len(points))
     parts = flat_parts(points, cells)
     outside = boundary_facets(cells)
-    volumes = PointVolumes(cells, slopes, weight, _numbered_corners(cells))
+    volumes = PointVolumes(cells, slopes, weight, _numbered_corners(cells, own))
     body = Body(
         points,
         mass,
@@ -83,9 +92,13 @@ def quadratic_body(
     return body if lumen is None else _with_lumen(body, volumes, lumen)
 
 
-def _numbered_corners(cells: np.ndarray) -> np.ndarray:
-    """The corners (k, 4) of the cells, numbered among the corners alone."""
-    return np.unique(cells[:, :4], return_inverse=True)[1].reshape(-1, 4)
+def _numbered_corners(cells: np.ndarray, own: np.ndarray) -> np.ndarray:
+    """The volume of each corner of the cells, (k, 4): those of the corners of cells that are not `own` (k,), then those
+    of the cells that are."""
+    number = np.empty((len(cells), 4), dtype=np.int64)
+    number[~own] = np.unique(cells[~own, :4], return_inverse=True)[1].reshape(-1, 4)
+    number[own] = number[~own].max(initial=-1) + 1 + np.arange(own.sum())[:, None]
+    return number
 
 
 def _with_lumen(body: Body, volumes: PointVolumes, lumen: np.ndarray) -> Body:

@@ -20,7 +20,7 @@ def point_rows(body: Body, volumes: PointVolumes, inverse_mass: np.ndarray) -> P
     diagonal, scale, inverse = inverse_at_rest(_compliance(volumes.jacobian(body.rest), inverse_mass))
     closed = np.empty((0, 3), dtype=np.uint32) if volumes.closed is None else volumes.closed.triangles
     node_start, node_entry = _entries(volumes.cells, n, 3)
-    volume_start, volume_entry = _entries(volumes.corner_volume, volumes.vertex_count, 1)
+    volume_start, volume_entry = _entries(volumes.corner_volume, volumes.tissue_count, 1)
     return PointRows(
         node=_in_blocks(volumes.cells.astype(np.uint32)),
         per_weight=_in_blocks(1.0 / volumes.weight),

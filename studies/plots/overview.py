@@ -38,7 +38,7 @@ def figure(runs: Sequence[Run]) -> Figure:
 
 def _point(run: Run) -> Point | None:
     body = run.case.body
-    shown = body.kind in KINDS and body.volumes == "scene" and run.case.method.name == "implicit_volume"
+    shown = body.kind in KINDS and body.volumes in ("scene", "vertex") and run.case.method.name == "implicit_volume"
     if not shown or run.timing is None or run.reference is None or run.record.status not in COMPARABLE:
         return None
     return body.kind, run.case.scene.name, real_time(run), force_end(run)

@@ -68,7 +68,7 @@ def figure(runs: Sequence[Run]) -> Figure:
 def _best(runs: Sequence[Run], kind: str) -> Run | None:
     """The finest body of the kind that has ended well, with the volumes that are its default."""
     fitting = [r for r in runs if r.case.scene.name == SCENE and r.case.body.kind == kind]
-    fitting = [r for r in fitting if r.record.status in COMPARABLE and r.case.body.volumes == "scene"]
+    fitting = [r for r in fitting if r.record.status in COMPARABLE and r.case.body.volumes in ("scene", "vertex")]
     return max(fitting, key=lambda run: run.case.body.nodes, default=None)
 
 

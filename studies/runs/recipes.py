@@ -15,6 +15,8 @@ from studies.runs.user_code import law_names
 ADAPTIVE, ADAPTER = "adaptive", "studies.reference.adaptive_mesh"
 """Value of `graded` for quadratic elements graded by one solution on a coarse mesh, and the module that computes it."""
 
+OF_QUADRATIC = ("vertex", "element", "mixed")
+"""Values of `volumes` of quadratic bodies. The JSON of a recipe leaves out the first: older ones know no other."""
 VIRTUAL = "virtual"
 """Value of `cut` for a body that is cut through its cells."""
 
@@ -53,6 +55,9 @@ class BodyRecipe:
             "regions": f", {self.regions} volumes",
             "patches": ", volumes of patches",
             "nodal": ", nodal volumes",
+            "vertex": "",
+            "element": ", volumes of elements",
+            "mixed": ", mixed volumes",
         }
         words = {True: "graded ", False: "", ADAPTIVE: "adaptive "}[self.graded] + self.kind + volumes[self.volumes]
         words += ", contact at nodes" if self.contact == "nodes" else ""
@@ -108,6 +113,10 @@ class TetrahedralBody(BodyRecipe):
 
     def __post_init__(self) -> None:
         lookup(self.law, law_names(), "stiffness law")
+        if self.volumes in OF_QUADRATIC:
+            raise StudyError(
+                f"volumes '{self.volumes}' are of quadratic elements; take a QuadraticBody, or volumes='nodal'"
+            )
         if self.graded not in (True, False):
             raise StudyError("a tetrahedral body is not graded by a solution; take a QuadraticBody or graded=True")
 
@@ -139,7 +148,7 @@ class MembraneBody(BodyRecipe):
 
 @dataclass(frozen=True)
 class QuadraticBody(BodyRecipe):
-    """Springs between all nodes of quadratic tetrahedra, which follow the true shape, with one volume per vertex."""
+    """Springs between all nodes of quadratic tetrahedra, which follow the true shape."""
 
     kind: ClassVar[str] = "quadratic"
     _: KW_ONLY
@@ -149,8 +158,14 @@ class QuadraticBody(BodyRecipe):
     mass: Literal["lumped", "stiffness"] = "lumped"
     """Inertial mass: the body's own, or "stiffness": the same total mass, distributed in proportion to the stiffness at
     each node, for longer steps if inertia does not matter (studies.scene.inertia)."""
+    volumes: Literal["vertex", "element", "mixed"] = "vertex"
+    """Which volumes are kept: one per vertex, with continuous pressures; one per element; "mixed": one per element with
+    a node in a held region, at whose edge the pressure jumps, and one per vertex elsewhere."""
     contact: Literal["facets", "nodes"] = "facets"
     """Where obstacles touch it: at points inside its facets, or at its nodes, which is cheaper."""
+
+    def __post_init__(self) -> None:
+        lookup(self.volumes, OF_QUADRATIC, "kind of volumes of a quadratic body")
 
 
 KINDS = TetrahedralBody, SurfaceBody, MembraneBody, QuadraticBody
@@ -163,8 +178,9 @@ USUAL: dict[str, Any] = {"kind": TetrahedralBody.kind} | {
 
 
 def recipe_to_dict(body: BodyRecipe) -> dict[str, Any]:
-    """JSON-able form: kind and settings."""
-    return {"kind": body.kind, **asdict(body)}
+    """JSON-able form: kind and settings, without the volumes that a quadratic body had before it could choose."""
+    whole = {"kind": body.kind, **asdict(body)}
+    return {name: value for name, value in whole.items() if (name, value) != ("volumes", OF_QUADRATIC[0])}
 
 
 def recipe_from_dict(data: Mapping[str, Any]) -> BodyRecipe:
@@ -177,6 +193,8 @@ def recipe_from_dict(data: Mapping[str, Any]) -> BodyRecipe:
     own = [setting.name for setting in fields(kind)]
     passed = {"kind", "regions", *(name for name in USUAL if data.get(name) == USUAL[name])}
     settings = {name: value for name, value in data.items() if name in own or name not in passed}
+    if kind is QuadraticBody and settings.get("volumes", "scene") == "scene":  # written before it could choose
+        settings["volumes"] = OF_QUADRATIC[0]
     _check_own(kind, settings)
     return _strict(kind).validate_python(settings)
 

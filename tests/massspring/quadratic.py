@@ -76,10 +76,11 @@ def lumen_of(points: np.ndarray, nodes: np.ndarray) -> np.ndarray:
     return facets[away < 0][:, [0, 2, 1, 5, 4, 3]]
 
 
-def hollow_ball(**options) -> Body:
+def hollow_ball(mixed: bool = False, **options) -> Body:
     """A wall between 0.6 and 1 of the radius, its lumen kept."""
     points, nodes = ball_mesh(1, (1.0,), inner=0.6)
-    return quadratic_body(points, nodes, SOFT, lumen_of(points, nodes), **options)
+    own = every_third(nodes) if mixed else None
+    return quadratic_body(points, nodes, SOFT, lumen_of(points, nodes), own_volumes=own, **options)
 
 
 def straight_hollow() -> tuple[np.ndarray, np.ndarray]:
@@ -159,6 +160,16 @@ def linear_solid(cells=(3, 3, 2), **options) -> Body:
 def curved_solid(**options) -> Body:
     """Quadratic tetrahedra with bent sides."""
     return quadratic_body(*curved_block(), SOFT, **options)
+
+
+def mixed_solid(make=curved_block, **options) -> Body:
+    """The same with a volume of its own in every third element."""
+    points, cells = make()
+    return quadratic_body(points, cells, SOFT, own_volumes=every_third(cells), **options)
+
+
+def every_third(cells: np.ndarray) -> np.ndarray:
+    return np.arange(len(cells)) % 3 == 0
 
 
 def straight_solid(cells=(2, 2, 2), distortion=0.15, **options) -> Body:

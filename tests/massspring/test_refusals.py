@@ -130,6 +130,13 @@ TABLE = [
     ("unknown law 'rubber' of a wall", lambda: membrane_body(*MESH, 0.003, SOFT, law="rubber")),
     ("unknown inertia 'heavy'; choose lumped", lambda: quadratic_body(*quadratic_block(), SOFT, inertia="heavy")),
     ("unknown contact 'edges'; choose facets", lambda: quadratic_body(*quadratic_block(), SOFT, contact="edges")),
+    *[
+        (
+            "give True or False for each of the 48 elements",
+            lambda o=o: quadratic_body(*quadratic_block(), SOFT, own_volumes=o),
+        )
+        for o in (np.ones(48), np.ones(47, dtype=bool))
+    ],
     ("the body has none; fill its mesh", lambda: Volumes.nodal(ball())),
     ("the body has none; fill its mesh", lambda: Volumes.regions(ball(), 4)),
     ("names a node beyond", lambda: cells().keeping(Volumes.nodal(hollow()))),

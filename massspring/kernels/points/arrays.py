@@ -62,7 +62,7 @@ class FacetRows(NamedTuple):
 
 @by_address
 class PointRows(NamedTuple):
-    """m volumes over b blocks of quadratic tetrahedra: first v of vertices, then those inside closed surfaces.
+    """m volumes over b blocks of quadratic tetrahedra: first v of the tissue, then those inside closed surfaces.
 
     A row holds one number of each element of a block. Unused places repeat the first element; their results are
     ignored.
@@ -84,11 +84,11 @@ class PointRows(NamedTuple):
     node_entry: np.ndarray
     """Flat index in `element_push` of each contribution to a node, uint32; y and z are BLOCK and 2 BLOCK further on."""
     volume_start: np.ndarray
-    """First entry of each vertex in `volume_entry`, (v + 1,) uint32."""
+    """First entry of each volume of the tissue in `volume_entry`, (v + 1,) uint32."""
     volume_entry: np.ndarray
-    """Flat index in `corner_share` of each contribution to a vertex, uint32."""
+    """Flat index in `corner_share` of each contribution to a volume, uint32."""
     closed_triangles: np.ndarray
-    """Closed surface whose volume is kept in addition to those of vertices, (t, 3) uint32; empty for a solid body."""
+    """Closed surface whose volume is kept in addition to those of the tissue, (t, 3) uint32; empty for a solid body."""
     closed_nodes: np.ndarray
     """Its nodes, (c,) uint32."""
     closed_gradient: np.ndarray

@@ -77,7 +77,7 @@ def linear_elements_frame(frame, rows, bulk_modulus):
 
 @njit_lean
 def quadratic_elements_frame(frame, rows, bulk_modulus):
-    """The same with one volume per vertex of quadratic elements (eq. 8.8–8.12, 9.3–9.5)."""
+    """The same with the volumes of quadratic elements (eq. 8.8–8.12, 9.3–9.5)."""
     model, nodes, boundary, diagnostics = frame.model, frame.nodes, frame.boundary, frame.diagnostics
     push = Push(rows.push, 1.0)
     open_frame(frame)

@@ -84,7 +84,7 @@ def meet_points(frame, step, push, rows, implicit):
 
 @njit_lean
 def point_volumes_frame(frame, rows, implicit, accuracy, pairs):
-    """One frame with one volume per vertex (eq. 3.1–3.8, 8.3–8.5, 8.8–8.13); `rows.lam` [Pa] holds the multipliers on
+    """One frame with volumes over points (eq. 3.1–3.8, 8.3–8.5, 8.8–8.13); `rows.lam` [Pa] holds the multipliers on
     entry and exit.
 
     `implicit`: the factor of implicit springs, or None. `pairs`: faces of a cut that may touch, or None.

@@ -43,9 +43,9 @@ FAMILIES: dict[tuple[str, bool | str, str], Family] = {
     ("tetrahedral", False, "regions"): Family("tetrahedra, some volumes", ORANGE, "D"),
     ("tetrahedral", False, "nodal"): Family("tetrahedra, a volume per node", PURPLE, "^"),
     ("tetrahedral", False, SMOOTH): Family("tetrahedra, smoothed over edges", MUTED[0], "d"),
-    ("quadratic", False, "scene"): Family("quadratic, uniform", SKY, "P"),
-    ("quadratic", True, "scene"): Family("quadratic, graded", BLUE, "*"),
-    ("quadratic", ADAPTIVE, "scene"): Family("quadratic, adaptive", GREEN, (5, 1, 36)),
+    ("quadratic", False, "vertex"): Family("quadratic, uniform", SKY, "P"),
+    ("quadratic", True, "vertex"): Family("quadratic, graded", BLUE, "*"),
+    ("quadratic", ADAPTIVE, "vertex"): Family("quadratic, adaptive", GREEN, (5, 1, 36)),
     ("tetrahedral", True, "scene"): Family("tetrahedra, graded", MUTED[4], "v"),
 }
 """(kind of body, whether it is graded, its volumes) -> family; no two markers are alike."""

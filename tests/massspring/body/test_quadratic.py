@@ -18,6 +18,7 @@ from tests.massspring.quadratic import (
     jiggled,
     local_force,
     lumen_of,
+    mixed_solid,
     quadratic_block,
     shape_functions,
     straight_hollow,
@@ -33,9 +34,13 @@ def mesh(request):
     return MESHES[request.param]()
 
 
-@pytest.fixture(params=[*MESHES, "hollow"])
+@pytest.fixture(params=[*MESHES, "hollow", "mixed", "mixed hollow"])
 def body(request) -> Body:
-    return hollow_ball() if request.param == "hollow" else quadratic_body(*MESHES[request.param](), SOFT)
+    if request.param == "mixed":
+        return mixed_solid()
+    if request.param not in MESHES:
+        return hollow_ball(mixed=request.param == "mixed hollow")
+    return quadratic_body(*MESHES[request.param](), SOFT)
 
 
 def test_shape_functions_are_one_at_their_node_and_sum_to_one():
@@ -68,7 +73,7 @@ def test_the_volume_of_a_curved_ball_is_that_of_the_ball():
 def test_volumes_sum_to_the_whole_and_the_springs_are_balanced(body):
     """K X = Σ w ∇N at rest: springs −mu K and mu ∂V/∂x cancel at every node."""
     volumes = volumes_of(body)
-    count = volumes.vertex_count
+    count = volumes.tissue_count
     assert body.rest_volumes[:count].sum() == pytest.approx(volumes.weight.sum(), rel=1e-14)
     k = spring_stiffness(body, body.rest)
     pull = k @ body.rest.ravel()
@@ -141,10 +146,29 @@ def test_facets_and_flat_parts_fill_the_element():
     assert np.array_equal(np.unique(flat_parts(points, cells)), np.arange(len(points)))
 
 
+def test_elements_with_a_volume_of_their_own_keep_that_of_their_points():
+    """Vertices have what the other elements give them; one that no other element names has no volume."""
+    points, cells = quadratic_block()
+    own = (cells[:, :4] == cells[0, 0]).any(axis=1)
+    body = quadratic_body(points, cells, SOFT, own_volumes=own)
+    volumes, x = volumes_of(body), jiggled(body)
+    vertices = len(np.unique(cells[:, :4])) - 1
+    assert volumes.names == (
+        *(f"vertex {r}" for r in range(vertices)), *(f"element {e}" for e in np.flatnonzero(own))
+    )  # fmt: skip
+    each = volumes.weight * volumes.jacobians(x)
+    assert np.allclose(volumes.measure(x)[vertices:], each[own].sum(axis=1), rtol=1e-13)
+    plain = quadratic_body(points, cells, SOFT)
+    shares = each[~own] @ BARYCENTRIC
+    number = np.searchsorted(np.unique(cells[~own, :4]), cells[~own, :4])
+    assert np.allclose(volumes.measure(x)[:vertices], np.bincount(number.ravel(), shares.ravel()), rtol=1e-13)
+    assert volumes.measure(x).sum() == pytest.approx(volumes_of(plain).measure(x).sum(), rel=1e-13)
+
+
 def test_the_lumen_is_one_more_volume():
     body = hollow_ball()
     volumes = volumes_of(body)
-    assert volumes.names[-1] == "lumen" and volumes.count == volumes.vertex_count + 1 == len(volumes.names)
+    assert volumes.names[-1] == "lumen" and volumes.count == volumes.tissue_count + 1 == len(volumes.names)
     assert body.rest_volumes[-1] == pytest.approx(0.6**3 * BALL, rel=0.06) and body.rest_volumes[-1] < 0.6**3 * BALL
     assert body.rest_lam[-1] == 0.0 and (body.rest_lam[:-1] == SOFT.shear_modulus).all()
     straight = straight_hollow()
@@ -208,7 +232,7 @@ def test_forces_are_the_gradient_of_the_energy(body):
 
 def test_the_stiffness_at_rest_is_that_of_all_forces(body):
     volumes = volumes_of(body)
-    solid = np.where(np.arange(volumes.count) < volumes.vertex_count, body.rest_pressure, 0.0)
+    solid = np.where(np.arange(volumes.count) < volumes.tissue_count, body.rest_pressure, 0.0)
 
     def force(x):
         return -(spring_stiffness(body, x) @ x.ravel()) + local_force(body, x) + volumes.jacobian(x).T @ solid

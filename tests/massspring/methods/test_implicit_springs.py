@@ -17,7 +17,6 @@ from massspring import (
     Setup,
     Trajectory,
     Volumes,
-    quadratic_body,
     simulate,
     step_limit,
     tetrahedral_body,
@@ -28,7 +27,7 @@ from massspring.methods.implicit.factor import Factor
 from tests.massspring.conftest import SOFT, block
 from tests.massspring.methods import test_methods as contract
 from tests.massspring.methods.test_methods import squeeze, thrown
-from tests.massspring.quadratic import curved_block
+from tests.massspring.quadratic import curved_solid, mixed_solid
 
 LONG = 20.0
 """Steps in explicit limits 2/ω_max."""
@@ -203,9 +202,9 @@ CONTRACT = (
 DURATION = 0.6
 
 
-@pytest.fixture(scope="module")
-def own_block() -> Body:
-    return quadratic_body(*curved_block(), SOFT)
+@pytest.fixture(scope="module", params=[curved_solid, mixed_solid], ids=["vertices", "mixed"])
+def own_block(request) -> Body:
+    return request.param()
 
 
 @pytest.mark.parametrize("promise", CONTRACT, ids=lambda promise: promise.__name__.removeprefix("test_"))

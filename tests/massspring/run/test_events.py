@@ -36,7 +36,8 @@ from tests.massspring.cuts import CELLS, body_of_cells, layer_faces
 from tests.massspring.quadratic import second_order
 
 HALF, PULL = 2, 0.004
-KINDS = ("one", "van_gelder nodal", "cotangent", "quadratic")
+KINDS = ("one", "van_gelder nodal", "cotangent", "quadratic", "mixed")
+"""Of bodies: their volumes, law or elements; "mixed": quadratic elements on one side keep their own volumes."""
 
 
 class Cut:
@@ -45,7 +46,7 @@ class Cut:
     def __init__(self, kind: str, reach: float = HALF, at: int = 6, frames: int = 12, free: bool = False, **options):
         points, _, cells = block(CELLS)
         self.faces = layer_faces(cells, CELLS, CELLS[0] // 2, reach)
-        if kind == "quadratic":
+        if kind in ("quadratic", "mixed"):
             points, cells = second_order(points, cells)
         self.points, self.cells, self.kind, self.free = points, cells, kind, free
         self.before = self.body(points, cells)
@@ -62,6 +63,8 @@ class Cut:
         )
 
     def body(self, points: np.ndarray, cells: np.ndarray) -> Body:
+        if self.kind == "mixed":
+            return body_alone(self.kind, points, cells)
         body = body_of_cells(points, cells, "cotangent" if self.kind == "cotangent" else "van_gelder")
         if self.kind == "one" and len(points) > len(self.points):
             part = points[cells].mean(axis=1)[:, 0] > 0.04
@@ -215,6 +218,8 @@ STRETCH = 1.1
 
 def body_alone(kind: str, points: np.ndarray, cells: np.ndarray) -> Body:
     """The body that `kind` makes of cells in one piece."""
+    if kind == "mixed":
+        return quadratic_body(points, cells, SOFT, own_volumes=points[cells].mean(axis=1)[:, 1] > 0.03)
     body = body_of_cells(points, cells, "cotangent" if kind == "cotangent" else "van_gelder")
     return body.keeping(Volumes.nodal(body)) if kind == "van_gelder nodal" else body
 

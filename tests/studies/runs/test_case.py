@@ -34,6 +34,7 @@ CHANGES = {
     "stiffness": {"body": TetrahedralBody(stiffness=1.01)},
     "quadratic": {"body": QuadraticBody()},
     "graded": {"body": TetrahedralBody(graded=True)},
+    "own volumes": {"body": QuadraticBody(volumes="mixed")},
     "mass": {"body": QuadraticBody(graded=True, mass="stiffness")},
     "cut": {"body": TetrahedralBody(cut="virtual")},
     "method": {"method": Free()},
@@ -99,6 +100,7 @@ NAMES = {
 }
 SERIES = {
     "graded quadratic, masses by stiffness": QuadraticBody(800, graded=True, mass="stiffness"),
+    "quadratic, mixed volumes": QuadraticBody(volumes="mixed"),
     "graded tetrahedral, nodal volumes": TetrahedralBody(volumes="nodal", graded=True),
     "tetrahedral, virtual nodes": TetrahedralBody(cut="virtual"),
 }
@@ -162,6 +164,8 @@ def test_a_recipe_of_release_0_3_is_read(kind, more):
         (TetrahedralBody, {"law": "van_geldr"}, "unknown stiffness law 'van_geldr'; did you mean 'van_gelder'"),
         (TetrahedralBody, {"mass": "stiffness"}, "a tetrahedral body has no setting 'mass'"),
         (TetrahedralBody, {"graded": "adaptive"}, "not graded by a solution; take a QuadraticBody"),
+        (TetrahedralBody, {"volumes": "mixed"}, "volumes 'mixed' are of quadratic elements; take a QuadraticBody, or"),
+        (QuadraticBody, {"volumes": "nodal"}, "volumes of a quadratic body 'nodal'; known are element, mixed, vertex"),
         (QuadraticBody, {"cut": "virtual"}, "a quadratic body has no setting 'cut'"),
         (QuadraticBody, {"law": "uniform"}, "a quadratic body has no setting 'law'"),
     ],

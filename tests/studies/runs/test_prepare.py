@@ -13,13 +13,14 @@ from studies.runs.case import Case
 from studies.runs.prepare import attachments_for, body_for, prepare
 from studies.runs.recipes import BODIES, MembraneBody, QuadraticBody, TetrahedralBody
 from studies.runs.run import measure
-from studies.scene.library import BLADDER_FILL
+from studies.scene.library import BALL_INCISED, BLADDER_FILL
 from studies.scene.library.ball_clamped import BALL_CLAMPED
 from studies.scene.library.ball_ringing import BALL_RINGING
 from studies.scene.library.ball_squeeze import BALL_SQUEEZE, DEPTH, PRESS_END, RADIUS
 from studies.store.record import Status
 from tests.campaigns import campaign
 from tests.massspring.analysis.test_stability import natural_frequencies
+from tests.massspring.quadratic import volumes_of
 from tests.studies.tiny import NODES, tiny_case
 
 CLAMPED = replace(BALL_CLAMPED, reference=None)
@@ -37,6 +38,24 @@ def test_only_a_tetrahedral_body_is_filled():
     assert abs(hollow.mesh.surface_count - NODES) <= 0.02 * NODES + 1
     # The paper's body has virtual nodes on its axis on top of the mesh.
     assert hollow.setup.body.node_count > len(hollow.mesh.points)
+
+
+@pytest.mark.parametrize("volumes", ["vertex", "element", "mixed"])
+def test_elements_keep_their_own_volume_at_held_regions_or_everywhere(volumes):
+    setup = prepare(Case(CLAMPED, QuadraticBody(294, volumes=volumes))).setup
+    kept = volumes_of(setup.body)
+    at_caps = np.isin(kept.cells, np.concatenate([held.nodes for held in setup.attachments])).any(axis=1)
+    assert 0 < at_caps.sum() < len(at_caps)
+    own = {"vertex": [], "element": np.arange(len(kept.cells)), "mixed": np.flatnonzero(at_caps)}[volumes]
+    np.testing.assert_array_equal(kept.own, own)
+
+
+def test_after_a_cut_through_a_held_region_the_same_elements_keep_their_volume():
+    (event,) = (setup := prepare(Case(BALL_INCISED, QuadraticBody(600, volumes="mixed"))).setup).events
+    before, after = volumes_of(setup.body), volumes_of(event.body)
+    np.testing.assert_array_equal(before.own, after.own)
+    was = [before.names[r] for r in event.volume_parent[-len(after.own) :]]
+    assert was == list(after.names[-len(after.own) :])
 
 
 def test_stiffness_multiplies_every_spring(ball_mesh):

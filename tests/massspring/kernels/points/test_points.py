@@ -17,11 +17,11 @@ CLOSE = 1e-12
 DT = 1e-3
 
 
-@pytest.fixture(params=["small", "curved", "hollow"])
+@pytest.fixture(params=["small", "curved", "hollow", "mixed"])
 def body(request) -> Body:
-    """6 elements, fewer than a block; 54, not a multiple of it; 240 with a lumen."""
-    if request.param == "hollow":
-        return hollow_ball()
+    """6 elements, fewer than a block; 54, not a multiple of it; 240 with a lumen; the same with volumes of elements."""
+    if request.param in ("hollow", "mixed"):
+        return hollow_ball(mixed=request.param == "mixed")
     return quadratic_body(*(quadratic_block((1, 1, 1)) if request.param == "small" else curved_block((3, 3, 1))), SOFT)
 
 

@@ -8,14 +8,24 @@ from massspring.kernels.forces.elements import add_element_stiffness, element_en
 from massspring.kernels.forces.springs import spring_energy, spring_forces_into
 from massspring.methods.elements.newton import NewtonStep
 from massspring.methods.elements.tangent import elements_of, target_ratios
-from tests.massspring.quadratic import MU, curved_solid, deformation, energy_without_volume, jiggled, linear_solid
+from tests.massspring.quadratic import (
+    MU,
+    curved_solid,
+    deformation,
+    energy_without_volume,
+    jiggled,
+    linear_solid,
+    mixed_solid,
+)
 
 BULK = 20.0 * MU
 
 
-@pytest.fixture(scope="module", params=["linear", "quadratic"])
+@pytest.fixture(scope="module", params=["linear", "quadratic", "mixed"])
 def solid(request):
-    return linear_solid() if request.param == "linear" else curved_solid(contact="nodes")
+    if request.param == "linear":
+        return linear_solid()
+    return (curved_solid if request.param == "quadratic" else mixed_solid)(contact="nodes")
 
 
 @pytest.fixture

@@ -14,16 +14,22 @@ from tests.massspring.quadratic import (
     MU,
     curved_solid,
     linear_solid,
+    mixed_solid,
     nodal_energy,
     straight_solid,
     uniaxial,
 )
 
-BODIES = {"linear": linear_solid, "quadratic": curved_solid, "contact at nodes": lambda: curved_solid(contact="nodes")}
+BODIES = {
+    "linear": linear_solid,
+    "quadratic": curved_solid,
+    "contact at nodes": lambda: curved_solid(contact="nodes"),
+    "mixed": mixed_solid,
+}
 RATIO = ExplicitElements.bulk_ratio
 
 
-@pytest.fixture(scope="module", params=("linear", "quadratic"))
+@pytest.fixture(scope="module", params=("linear", "quadratic", "mixed"))
 def solid(request):
     return BODIES[request.param]()
 

@@ -22,7 +22,7 @@ from massspring.methods.method import begin_frame
 from tests.massspring.conftest import SOFT
 from tests.massspring.methods import test_methods as contract
 from tests.massspring.methods.test_methods import clock_for
-from tests.massspring.quadratic import curved_block, hollow_ball
+from tests.massspring.quadratic import curved_block, hollow_ball, mixed_solid
 
 CONTRACT = (
     contract.test_rest_stays_at_rest,
@@ -57,9 +57,10 @@ def test_the_contract_of_methods_holds(promise, block):
     promise(block, ImplicitVolume())
 
 
-@pytest.mark.parametrize("promise", [CONTRACT[1], CONTRACT[7]], ids=("spin", "volume"))
-def test_the_contract_holds_with_a_lumen(promise, hollow):
-    promise(hollow, ImplicitVolume())
+@pytest.mark.parametrize("make", [hollow_ball, mixed_solid], ids=["lumen", "volumes of elements"])
+@pytest.mark.parametrize("promise", [CONTRACT[1], CONTRACT[3], CONTRACT[7]], ids=("spin", "turned", "volume"))
+def test_the_contract_holds_with_other_volumes(promise, make):
+    promise(make(), ImplicitVolume())
 
 
 def with_pressures_that_stay(state, boundary):

@@ -7,7 +7,7 @@ from massspring import Attachment, ImplicitVolume, Plane, Setup, Volumes, simula
 from tests.massspring.conftest import SOFT
 from tests.massspring.methods.test_implicit_volume import STARTS, start_of
 from tests.massspring.methods.test_methods import clock_for, thrown
-from tests.massspring.quadratic import curved_solid
+from tests.massspring.quadratic import curved_solid, mixed_solid
 
 RECOVERS = ImplicitVolume(recovers=True)
 LINE = (np.diag([1, 0, 0]), 0.0)
@@ -46,9 +46,12 @@ def test_from_any_start_the_rest_shape_comes_back_with_a_volume_at_every_node(st
     assert 0 < history.limited_corrections < 8 * 150 / 2
 
 
-@pytest.mark.parametrize("start", ["mirrored", "scrambled", "line"])
-def test_a_quadratic_body_comes_back(start):
-    body = curved_solid()
+@pytest.mark.parametrize(
+    ("start", "make"),
+    [("mirrored", curved_solid), ("scrambled", curved_solid), ("line", curved_solid), ("mirrored", mixed_solid)],
+)
+def test_a_quadratic_body_comes_back(start, make):
+    body = make()
     history = ended(body, start, frames=300)
     assert history.outcome == "finished" and distance(body, history.final) < BACK
 
