@@ -1,4 +1,4 @@
-"""A member of a population: an organ of its own under a load of its own: palpated, filled, or hanging."""
+"""A member of a population: an organ of its own under a load of its own: palpated, filled, hanging, or squeezed."""
 
 import zlib
 from dataclasses import dataclass, replace
@@ -7,14 +7,14 @@ from functools import cache
 import numpy as np
 
 from massspring import Plane, Ramp, Sphere, Trajectory
-from studies import SHAPES, Lumen, Organ, Scene, StudyError
+from studies import SHAPES, ForceOutput, Lumen, Organ, Scene, StudyError
 from studies.geometry import vary
 from studies.geometry.organs.millimetres import probe_near
-from studies.geometry.shape.levelset import PalpationPoint, Shape, normals
-from studies.lab.population.ranges import RANGES, Filling, Palpation, Sagging
+from studies.geometry.shape.levelset import PalpationPoint, Shape, normals, project
+from studies.lab.population.ranges import RANGES, SQUEEZE, SQUEEZED, Filling, Palpation, Sagging
 from studies.scene.placing import Vector, along, press_times, probe_of, scaled
 
-NAME = "{organ}_{seed}_{number:03d}"
+NAME, SQUEEZED_NAME = "{organ}_{seed}_{number:03d}", "{organ}_squeezed_{seed}_{number:03d}"
 """Of a member's scene."""
 GAP = 0.0005
 """Between probe and surface at the start [m]."""
@@ -28,6 +28,16 @@ FLAT = 0.9
 """Least length of the mean normal round the patch that a probe touches: 1 is a plane, 0.9 a cone of 26 degrees."""
 BEHIND = 0.0009
 """Between a filled organ and the wall behind it [m], as in the scenes of the catalogue."""
+BESIDE = 0.0015
+"""Between a squeezed organ and each plane at the start [m]: curved facets of coarse meshes bulge that far."""
+CLEAR = 0.002
+"""Between each plane at the end and what is held [m]."""
+DIRECTIONS = 1000
+"""In which a squeeze is tried: a stomach that is squeezed by 45 % has one in fifty."""
+LIGHT = 2.0
+"""Damping of a squeezed organ [1/s]: so little that it hides no energy that a method adds."""
+ALL = Scene.quantities
+"""A squeezed organ is held and pressed: every quantity is compared."""
 COLUMNS = 24
 """Of the grid that finds how far an organ reaches back, along each side."""
 
@@ -39,16 +49,18 @@ class Population:
     organ: str
     count: int
     seed: int = 0
+    squeezed: bool = False
+    """Whether the same organs are squeezed between two planes, in place of the load of their kind."""
 
     def scenes(self) -> tuple[Scene, ...]:
-        """The scenes of all members. Raises StudyError for a member that cannot be palpated anywhere."""
-        return tuple(member(self.organ, self.seed, number) for number in range(self.count))
+        """The scenes of all members. Raises StudyError for a member that cannot be palpated or squeezed anywhere."""
+        return tuple(member(self.organ, self.seed, number, self.squeezed) for number in range(self.count))
 
 
-def member(organ: str, seed: int, number: int) -> Scene:
-    """The scene of member `number` of a population: the same for the same three, however many members are drawn.
+def member(organ: str, seed: int, number: int, squeezed: bool = False) -> Scene:
+    """The scene of member `number` of a population: the same for the same four, however many members are drawn.
 
-    Raises StudyError for a member on which no place for the probe is found.
+    Raises StudyError for a member on which no place for the probe, or for two planes, is found.
     """
     ranges = RANGES[organ]
     rng = np.random.default_rng([seed, number, zlib.crc32(organ.encode())])
@@ -67,6 +79,12 @@ def member(organ: str, seed: int, number: int) -> Scene:
         held=tuple(replace(held, region=shape.regions[held.name]) for held in base.held),
         reference=ranges.plan,
     )
+    if squeezed:
+        name, plan = (
+            SQUEEZED_NAME.format(organ=organ, seed=seed, number=number),
+            replace(SQUEEZED, base=ranges.plan.base),
+        )
+        return _squeezed(replace(scene, name=name, reference=plan), shape, rng)
     match ranges.load:
         case Palpation() as palpation:
             return _pressed(scene, shape, palpation, rng)
@@ -115,6 +133,51 @@ def _hanging(scene: Scene, acceleration: float) -> Scene:
         title=f"A {scene.organ.shape} of a population, hanging under {acceleration:.1f} m/s²",
         gravity=pull,
     )
+
+
+def _squeezed(scene: Scene, shape: Shape, rng: np.random.Generator) -> Scene:
+    """A member between two planes that take a share of its thickness, each one half, along a direction in which they
+    stay clear of what is held. Raises StudyError where none is found."""
+    share, surface = float(rng.uniform(*SQUEEZE)), _surface(shape)
+    held = surface[np.any([held.region.level(surface) <= 0.0 for held in scene.held], axis=0)]
+    ways = rng.normal(size=(DIRECTIONS, 3))
+    axes = np.round(ways / np.linalg.norm(ways, axis=1, keepdims=True), 9)  # as _rounded
+    reach, taken = surface @ axes.T, held @ axes.T
+    lowest, highest = reach.min(axis=0).round(5), reach.max(axis=0).round(5)
+    travel = (0.5 * share * (highest - lowest)).round(5)
+    clear = np.minimum(taken.min(axis=0) - lowest, highest - taken.max(axis=0)) - travel >= CLEAR
+    if not clear.any():
+        raise StudyError(f"member {scene.name}: no direction in which planes clear of what is held take {share:.0%}")
+    first = int(clear.argmax())
+    axis, low, high, deep = (axes[first], *(float(some[first]) for some in (lowest, highest, travel)))
+    end, inward = PRESSED * scene.duration, (_rounded(axis), _rounded(-axis))
+    planes = tuple(
+        Plane(
+            scaled(towards, start - BESIDE),
+            towards,
+            Trajectory((0.0, end), ((0.0, 0.0, 0.0), scaled(towards, deep + BESIDE))),
+        )
+        for towards, start in zip(inward, (low, -high), strict=True)
+    )
+    return replace(
+        scene,
+        title=f"A {scene.organ.shape} of a population, squeezed by {100 * share:.0f} % between two planes",
+        checkpoints=press_times(0.0, end, CHECKPOINTS, scene.duration),
+        obstacles=planes,
+        probed=ForceOutput("obstacle", 0, inward[0]),
+        lumen=None if scene.lumen is None else Lumen(),
+        gravity=(0.0, 0.0, 0.0),
+        damping=LIGHT,
+        quantities=ALL,
+        not_for=(),
+    )
+
+
+def _surface(shape: Shape) -> np.ndarray:
+    """Points of the surface [m], (n, 3), about a cell of the shape apart."""
+    axes = [np.arange(low, high, shape.cell) for low, high in zip(shape.low, shape.high, strict=True)]
+    grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+    return project(shape, grid[np.abs(shape.level(grid)) < 0.5 * shape.cell], within=1e-6)
 
 
 def _palpated(

@@ -7,6 +7,10 @@ from studies import BLADDER_FILL, KIDNEY_PROBE, LIVER_PROBE, SPLEEN_SAG, STOMACH
 Range = tuple[float, float]
 MEMBER = ReferencePlan(variants=(), tolerance=0.01, most=90e3)
 """Of a member: a minute of processor time; bars of up to half of the target in force, 0.6 % in mean displacement."""
+SQUEEZED = replace(MEMBER, at_contact=0, tolerance=0.008)
+"""Of a squeezed member: bars below a third of the targets. A plane touches so much that no halving is needed there."""
+SQUEEZE: Range = (0.10, 0.45)
+"""Share of its thickness by which two planes squeeze a member of any organ [1]."""
 
 
 @dataclass(frozen=True)

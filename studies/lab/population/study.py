@@ -3,7 +3,7 @@
 `organbench run studies/lab/population/study.py` brings it up to date.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from massspring import ImplicitVolume
@@ -19,25 +19,35 @@ MEMBERS = (
     Population("spleen", 30),
     Population("bladder", 30),
 )
+Recipes = tuple[tuple[BodyRecipe, float], ...]
+"""Bodies and their step over the limit."""
 NODES = 550
 """Surface nodes of the linear bodies, of a hollow organ as many again on its lumen."""
 
 
-def recipes_for(scene: Scene) -> tuple[tuple[BodyRecipe, float], ...]:
-    """The bodies that every member gets, and their step over the limit: the paper's; one volume; one volume per node;
-    the fastest even quadratic body; the graded ones of the accuracy study, and a finer one, which shows what a larger
-    budget of computing time is worth."""
+def recipes_for(scene: Scene) -> Recipes:
+    """The bodies that every member gets: the paper's; one volume; one volume per node; and the quadratic ones."""
     axis = "centre_line" if "wall" in scene.organ.parameters else "straight"
-    budgets = (*graded(scene), *(replace(body, nodes=FINEST) for body in graded(scene)[-1:]))
     return (
         (SurfaceBody(NODES, axis=axis), SHORT),
         (TetrahedralBody(nodes=NODES), SHORT),
         (TetrahedralBody(nodes=NODES, law="cotangent", volumes="nodal"), SHORT),
-        *((body, LONG) for body in (even(scene)[0], *budgets)),
+        *quadratic_for(scene),
     )
 
 
-def population_study(populations: Sequence[Population] = MEMBERS, name: str = POPULATION) -> Study:
+def quadratic_for(scene: Scene) -> Recipes:
+    """The fastest even quadratic body; the graded ones of the accuracy study, and a finer one, which shows what a
+    larger budget of computing time is worth."""
+    budgets = (*graded(scene), *(replace(body, nodes=FINEST) for body in graded(scene)[-1:]))
+    return tuple((body, LONG) for body in (even(scene)[0], *budgets))
+
+
+def population_study(
+    populations: Sequence[Population] = MEMBERS,
+    name: str = POPULATION,
+    recipes: Callable[[Scene], Recipes] = recipes_for,
+) -> Study:
     """Every recipe on every member, one member after the other. Organs take turns: a study cut short has whole members
     of each. The first member of each organ is timed.
 
@@ -52,7 +62,7 @@ def population_study(populations: Sequence[Population] = MEMBERS, name: str = PO
         cases=tuple(
             Case(scene, body, ImplicitVolume(), dt_fraction=fraction, timed=scene in first)
             for scene in turns
-            for body, fraction in recipes_for(scene)
+            for body, fraction in recipes(scene)
         ),
         charts=(
             Chart("distributions.png", "studies.lab.population.charts:draw"),

@@ -12,11 +12,12 @@ from studies import Case, QuadraticBody, Status
 from studies.geometry import organ
 from studies.lab.population.charts import figure, front
 from studies.lab.population.draw import Population, member
-from studies.lab.population.ranges import RANGES, Filling, Palpation, Sagging
+from studies.lab.population.ranges import RANGES, SQUEEZE, Filling, Palpation, Sagging
 from studies.lab.population.study import population_study
 from studies.lab.population.tables import members_of, rigid_share, trust_of, worst_of
 from studies.lab.population.warning import judgements, tally
 from studies.scene.as_json import scene_from_dict, scene_to_json
+from studies.scene.kind import load_of
 from tests.studies.made_up_run import POINTS, SCENE, bend, run
 
 pytestmark = pytest.mark.lab
@@ -58,6 +59,28 @@ def test_a_probe_starts_clear_of_the_mesh_and_ends_inside_it_and_off_what_is_hel
     assert np.linalg.norm(held - end, axis=1).min() > probe.radius
     for wall in (obstacle for obstacle in scene.obstacles if isinstance(obstacle, Plane)):
         assert 0.0 < wall.point[1] - mesh.points[:, 1].max() < 0.003
+
+
+@pytest.mark.parametrize("name", RANGES)
+def test_planes_squeeze_the_organ_of_the_member_by_the_drawn_share_and_stay_clear_of_what_is_held(name):
+    """Judged by the meshed organ."""
+    scenes = Population(name, 6, 1, squeezed=True).scenes()
+    assert scenes[:2] == Population(name, 2, 1, squeezed=True).scenes()
+    for scene in scenes:
+        assert scene_from_dict(json.loads(scene_to_json(scene))) == scene
+    scene = scenes[4]
+    assert scene.organ == member(name, 1, 4).organ and load_of(scene) == "squeeze"
+    mesh = organ(name, 430, scene.regions, False, scene.organ.parameters)
+    points = mesh.points[: mesh.outer_count]
+    held = np.concatenate([points[nodes] for nodes in mesh.patches.values()])
+    thickness, left = np.ptp(points @ scene.obstacles[0].normal), 0.0
+    for plane in scene.obstacles:
+        assert 0.0 < ((points - plane.point) @ plane.normal).min() < 0.003
+        end = np.asarray(plane.point) + plane.path.displacements[-1]
+        assert ((held - end) @ plane.normal).min() > 0.001
+        left -= end @ plane.normal
+    low, high = SQUEEZE
+    assert low - 0.01 < 1.0 - left / thickness < high + 0.01  # a mesh is a little thinner than the organ
 
 
 def test_organs_take_turns_so_that_a_study_cut_short_has_them_all():
