@@ -9,6 +9,7 @@ from studies.runs.recipes import VIRTUAL, BodyRecipe, QuadraticBody, SurfaceBody
 from studies.scene.library import CUT
 from studies.scene.library.ball_cuts import BALL_BISECTED, BALL_INCISED
 from studies.scene.scene import Scene
+from studies.store.schema import Status
 
 BODIES = (
     TetrahedralBody(nodes=350),
@@ -83,4 +84,5 @@ CUTTING = Study(
         "min_j",
         "real_time",
     ),
+    expects=(Status.INVERTED,),  # stomach_opened, springs with one volume
 )

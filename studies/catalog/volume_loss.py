@@ -5,6 +5,7 @@ from studies.catalog.study import Chart, Study
 from studies.runs.case import Case
 from studies.runs.recipes import SurfaceBody, TetrahedralBody
 from studies.scene.library import BALL_CLAMPED, BALL_SQUEEZE, LIVER_PRESS, LIVER_PROBE
+from studies.store.schema import Status
 
 TETRAHEDRAL, SURFACE = TetrahedralBody(), SurfaceBody()
 REPLAYED = (BALL_SQUEEZE, LIVER_PRESS, LIVER_PROBE)
@@ -45,4 +46,5 @@ VOLUME_LOSS = Study(
     charts=(*CHARTS, Chart("squeeze.png", "studies.plots.squeeze:draw")),
     columns=(*COLUMNS, "volume_end"),
     main=True,
+    expects=(Status.FOLDED,),  # ball_clamped, springs with one volume
 )

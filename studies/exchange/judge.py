@@ -25,7 +25,7 @@ from studies.reference.load import reference_for
 from studies.runs.case import Case
 from studies.runs.indicators import sway
 from studies.runs.prepare import LUMEN
-from studies.runs.status import inversion
+from studies.runs.status import folding
 from studies.scene.scene import Scene
 from studies.store.record import Record, Status, new_fields, new_record, write_record
 from studies.store.schema import RUN_FIELDS
@@ -91,7 +91,7 @@ def entry_record(
     about = {ENTRY: f"{path.name} sha256:{digest}", SECONDS: seconds}
     if "force" in fitting.histories:  # how much it varies at the end
         about["sway"] = sway(scene, values["t"], values["contact_force"], values["held_force"])
-    status, message = inversion(values["min_j"])
+    status, message = folding(values["min_j"], shaped=scene.start is not None and scene.start.shaped)
     return _record(Case(scene, fitting.mesh.recipe, method), status, message, _attributes(fitting) | about, values)
 
 

@@ -8,14 +8,12 @@ import numpy as np
 
 from studies.metrics.run import Run
 from studies.scene.quantities import ALWAYS, allowed
-from studies.store.record import Status
+from studies.store.schema import COMPARABLE
 
 PERCENT = 100.0
 RESOLVED_SHARE = 0.1
 """An error is doubtful if the uncertainty of its reference is more than this share of it (docs/theory.md, the
 reference)."""
-COMPARABLE = (Status.OK, Status.INVERTED, Status.DRIFTED)
-"""Statuses of runs that reach the last checkpoint."""
 
 
 @dataclass(frozen=True)

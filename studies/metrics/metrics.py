@@ -99,7 +99,7 @@ def silhouette_error(run: Run) -> float:
 
 
 def min_j(run: Run) -> float:
-    """Smallest J of an element over all frames [1]; NaN for a surface body."""
+    """Least J of an element after any frame [1]; NaN for a surface body."""
     return float(np.min(run.fields.min_j))
 
 

@@ -9,12 +9,12 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from studies.base.counting import heading
-from studies.metrics.metric import COMPARABLE
 from studies.metrics.metrics import force_end, opening_error
 from studies.metrics.run import Run, by_scene, doubled
 from studies.plots.style.page import blank, finish, page, panels
 from studies.plots.style.render import Camera, draw_faces, frame, scale_bar, smooth_normals
 from studies.plots.style.style import NORMAL, SMALL, drawing, styled
+from studies.store.schema import COMPARABLE
 
 TITLE = "Incised organs"
 CAMERAS = {

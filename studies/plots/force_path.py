@@ -11,7 +11,6 @@ from matplotlib.ticker import MaxNLocator
 
 from massspring import Trajectory
 from studies.base.counting import heading
-from studies.metrics.metric import COMPARABLE
 from studies.metrics.metrics import METRICS, force_end
 from studies.metrics.run import Run, by_scene
 from studies.plots.style.bodies import BodyLook, body_looks, body_method_handles
@@ -33,6 +32,7 @@ from studies.plots.style.page import (
 from studies.plots.style.style import BLACK, GREY, SMALL, drawing, styled
 from studies.runs.recipes import BodyRecipe
 from studies.scene.scene import Scene
+from studies.store.schema import COMPARABLE
 
 TITLE = "Force against the reference"
 CUT_TITLE = "Force on the end that is moved, of a body that is cut, against the reference"

@@ -10,7 +10,7 @@ from matplotlib.lines import Line2D
 from matplotlib.typing import LineStyleType
 
 from studies.base.counting import heading, readable
-from studies.metrics.metric import COMPARABLE, Metric
+from studies.metrics.metric import Metric
 from studies.metrics.metrics import METRICS
 from studies.metrics.run import Run, by_scene
 from studies.plots.style.page import (
@@ -40,6 +40,7 @@ from studies.plots.style.style import (
     remark,
     styled,
 )
+from studies.store.schema import COMPARABLE
 
 TITLE = "Stiffness laws: force and step limit"
 COLOURS = {

@@ -9,7 +9,7 @@ from matplotlib.ticker import LogLocator
 
 from massspring import Method
 from studies.base.counting import heading, readable
-from studies.metrics.metric import COMPARABLE, Metric
+from studies.metrics.metric import Metric
 from studies.metrics.metrics import METRICS, real_time
 from studies.metrics.run import Run, by_scene
 from studies.plots.style.bodies import body_looks
@@ -26,6 +26,7 @@ from studies.plots.style.page import (
 )
 from studies.plots.style.style import BLUE, GREEN, GREY, ORANGE, PURPLE, SMALL, drawing, method_label, styled
 from studies.runs.case import chosen_settings
+from studies.store.schema import COMPARABLE
 
 TITLE = "Ways to keep a volume: same bodies, same fraction of the step limit unless a step is named"
 QUANTITIES = {

@@ -8,7 +8,6 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from studies.base.counting import heading
-from studies.metrics.metric import COMPARABLE
 from studies.metrics.run import Run, by_scene
 from studies.metrics.table import metric
 from studies.plots.style.bodies import BodyLook, body_looks, body_method_handles
@@ -25,6 +24,7 @@ from studies.plots.style.page import (
 )
 from studies.plots.style.style import BLACK, GREY, save, styled
 from studies.runs.recipes import BodyRecipe
+from studies.store.schema import COMPARABLE
 
 TITLE = "Opening of the incision against the reference"
 OPENING = metric("opening_error")

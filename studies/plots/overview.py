@@ -7,11 +7,11 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from studies.base.counting import readable
-from studies.metrics.metric import COMPARABLE
 from studies.metrics.metrics import force_end, real_time
 from studies.metrics.run import Run
 from studies.plots.style.page import blank, finish, page, panels
 from studies.plots.style.style import BLACK, GREEN, GREY, NORMAL, VERMILLION, drawing, styled
+from studies.store.schema import COMPARABLE
 
 TITLE = "Error of the force against speed"
 KINDS = {"surface": BLACK, "tetrahedral": VERMILLION, "quadratic": GREEN}

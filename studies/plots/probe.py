@@ -11,12 +11,12 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
 from massspring import Sphere
-from studies.metrics.metric import COMPARABLE
 from studies.metrics.metrics import force_end
 from studies.metrics.run import Run
 from studies.plots.style.page import blank, finish, page, panels, signed_percent
 from studies.plots.style.render import Camera, draw_surface, frame, scale_bar
 from studies.plots.style.style import GREY, NORMAL, SMALL, drawing, styled
+from studies.store.schema import COMPARABLE
 
 TITLE = "A liver under a probe"
 SCENE = "liver_probe"

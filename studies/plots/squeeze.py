@@ -12,12 +12,12 @@ from scipy.spatial import ConvexHull
 from massspring import Plane
 from studies.base.counting import readable
 from studies.metrics.cells import MINUS
-from studies.metrics.metric import COMPARABLE
 from studies.metrics.metrics import force_end, volume_end, volume_worst
 from studies.metrics.run import Run
 from studies.plots.style.page import blank, finish, page, panels, signed_percent
 from studies.plots.style.render import Camera, draw_surface, frame, scale_bar, uniform
 from studies.plots.style.style import BLACK, GREY, NORMAL, SMALL, drawing, method_colour, method_label, styled
+from studies.store.schema import COMPARABLE
 
 TITLE = "A soft ball between two planes"
 SCENE, KINDS = "ball_squeeze", ("tetrahedral", "quadratic")

@@ -7,7 +7,6 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from studies.base.counting import heading
-from studies.metrics.metric import COMPARABLE
 from studies.metrics.run import Run, by_scene
 from studies.plots.style.bodies import BodyLook, body_looks, body_method_handles
 from studies.plots.style.page import (
@@ -22,6 +21,7 @@ from studies.plots.style.page import (
     remarks,
 )
 from studies.plots.style.style import BLACK, GREY, drawing, styled
+from studies.store.schema import COMPARABLE
 
 TITLE = "How much volume each model loses"
 PERCENT = 100.0

@@ -15,13 +15,13 @@ from studies.exchange.entry import entry_files, run_of_entry
 from studies.exchange.league import LEAGUE, SET, frozen
 from studies.metrics.cells import MISSING, plain, value_cell
 from studies.metrics.judged import cost_of
-from studies.metrics.metric import COMPARABLE
 from studies.metrics.table import metric
 from studies.metrics.wish import SOLID
 from studies.reference.load import reference_for
 from studies.report.page.markup import ASSETS, TEMPLATES
 from studies.report.page.svg import inline
 from studies.store.record import read_record
+from studies.store.schema import COMPARABLE
 from studies.store.tables import write_table
 
 NAME, CHART, TABLE = "league.html", "profiles.png", "league.csv"

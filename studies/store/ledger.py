@@ -13,12 +13,10 @@ from studies.base.errors import StudyError
 from studies.store.entry import Entry, read_entry, why_entry_is_stale
 from studies.store.machine import machine_id
 from studies.store.paths import SUFFIX, TIMING, index_path, study_folder, timing_name
-from studies.store.schema import Status
+from studies.store.schema import COMPARABLE, Status
 
 FAILURES = (Status.FAILED, Status.NOT_CONVERGED, Status.TIMED_OUT)
 """Endings that another run may improve."""
-TIMED = (Status.OK, Status.INVERTED, Status.DRIFTED)
-"""Endings with comparable frames: the run did not break off."""
 
 
 class Result(Protocol):
@@ -82,7 +80,7 @@ class Ledger:
 
     def can_be_timed(self, job: Result) -> bool:
         entry = self.entry(job)
-        return entry is not None and entry.status in TIMED
+        return entry is not None and entry.status in COMPARABLE
 
     def why_untimed(self, job: Result) -> str | None:
         """Why this machine must time a case (again), were it to be timed; None when it need not."""

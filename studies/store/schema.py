@@ -27,7 +27,8 @@ class Status(StrEnum):
 
     OK = "ok"  # finished without a failure
     DIVERGED = "diverged"  # values not finite, or nodes that left
-    INVERTED = "inverted"  # an element is inverted at the end
+    FOLDED = "folded"  # J of an element is below 0.1 after a frame
+    INVERTED = "inverted"  # J of an element is 0 or less after a frame
     DRIFTED = "drifted"  # a kept volume more than 1 % off
     NOT_CONVERGED = "not-converged"  # the reference found no equilibrium at a checkpoint
     BLOCKED = "blocked"  # a thin probe was driven through tissue that had nowhere to go
@@ -36,6 +37,8 @@ class Status(StrEnum):
     SKIPPED = "skipped"  # the method does not apply to the scene or the body; the message says why
 
 
+COMPARABLE = (Status.OK, Status.FOLDED, Status.INVERTED, Status.DRIFTED)
+"""Statuses of runs that reach the last checkpoint: all their frames can be compared and timed."""
 WITHOUT_FIELDS = (Status.FAILED, Status.SKIPPED)
 """Nothing was computed: such a record has no fields, and no attributes but warnings."""
 
@@ -73,7 +76,7 @@ class RunFields(Table):
     penetration = array("F o", NUMBER, "m", "depth of the deepest surface node in each obstacle")
     held_force = array("F g 3", NUMBER, "N", "force of each held region on the body, mean of the frame")
     iterations = array("F 2", INDEX, "1", "for the multipliers: sum of the frame, most in a step")
-    min_j = array("F", NUMBER, "1", "smallest volume ratio of tetrahedra, J at points of quadratic ones; NaN without")
+    min_j = array("F", NUMBER, "1", "least J of an element, of a quadratic one at its points; NaN without")
     snapshot_frame = array("K", INDEX, "1", "number of the frame after which each snapshot was taken")
     snapshots = array("K n 3", NUMBER, "m", "positions at the scene's checkpoints")
     rest = array("n 3", NUMBER, "m", "rest positions")

@@ -27,6 +27,7 @@ from studies.plots.style.style import (
 TITLE = "Which trials methods survive: random bodies, steps, starts and surroundings"
 LOOKS = {
     "ok": (GREEN, ""),
+    "folded": (PURPLE, ""),
     "inverted": (PURPLE, "////"),
     "drifted": (YELLOW, "...."),
     "penetrated": (ORANGE, "xxxx"),

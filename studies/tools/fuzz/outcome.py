@@ -13,6 +13,7 @@ from massspring import History, MassSpringError, Probe, Setup, simulate
 from studies.base.errors import StudyError
 from studies.base.processes import run_each
 from studies.geometry.mesh.organ_mesh import signed_volume
+from studies.runs.status import folding
 from studies.sweep.local import environment
 from studies.tools.fuzz.trial import Trial
 from studies.tools.fuzz.world import setup_of
@@ -34,7 +35,8 @@ class Outcome:
 
     trial: Trial
     status: str
-    """ "ok", "refused", "diverged", "blocked", "inverted", "drifted", "penetrated", "timed-out", or UNEXPLAINED."""
+    """ "ok", "refused", "diverged", "blocked", "folded", "inverted", "drifted", "penetrated", "timed-out", or
+    UNEXPLAINED."""
     message: str
     seconds: float
 
@@ -59,10 +61,10 @@ def tried(trial: Trial) -> Outcome:
 
 
 def named(setup: Setup, history: History) -> tuple[str, str]:
-    """What a finished run is called, and why: ok, inverted, drifted or penetrated."""
-    smallest = float(history.min_j[-1])
-    if smallest <= 0.0:
-        return "inverted", f"an element is inverted at the end (smallest volume ratio {smallest:.3g})"
+    """What a finished run is called, and why: ok, folded, inverted, drifted or penetrated."""
+    status, reason = folding(history.min_j, shaped=setup.positions is not None)
+    if reason:
+        return status, reason
     deepest = float(np.max(history.penetration[-1], initial=0.0))
     if deepest > INSIDE * setup.body.size:
         return "penetrated", f"a node lies {1e3 * deepest:.3g} mm inside an obstacle"

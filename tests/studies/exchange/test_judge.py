@@ -89,10 +89,12 @@ def test_an_entry_on_the_curved_mesh_is_measured_there(ours, mesh_cache, tmp_pat
     assert run.field("penetration")[1] == pytest.approx(reach - 0.05 * (1 - 0.3), rel=1e-6)
 
 
-def test_an_entry_inside_out_says_so(ours, tmp_path):
+@pytest.mark.parametrize(("height", "status"), [(0.05, Status.FOLDED), (-1.0, Status.INVERTED)])
+def test_an_entry_that_folds_on_its_way_says_so(ours, tmp_path, height, status):
     x = ours.positions.copy()
-    x[-1] *= [1.0, 1.0, -1.0]
-    assert judged(ours.npz(tmp_path / "a.npz", positions=x)).record.status == Status.INVERTED
+    x[1] = ours.positions[0] * [1.0, 1.0, height]
+    record = judged(ours.npz(tmp_path / "a.npz", positions=x)).record
+    assert record.status == status and f"after 1 of {len(x) - 1} frames (least J {height:g};" in record.message
 
 
 def test_without_its_reference_nothing_but_errors_is_left_out(organbench, ours, scene_file, tmp_path):

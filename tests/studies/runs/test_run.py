@@ -15,9 +15,10 @@ from studies.runs.case import Case
 from studies.runs.prepare import prepare
 from studies.runs.recipes import BODIES, MembraneBody, SurfaceBody, TetrahedralBody
 from studies.runs.run import checkpoint_frames, measure, replay, run_case
-from studies.runs.status import status_of
+from studies.runs.status import FOLDED, status_of
 from studies.scene.library.stress import STRESS_SCENES
 from studies.scene.scene import Held, Organ
+from studies.scene.start import InitialConditions
 from studies.store.record import Field, Status, read_record, write_record
 from tests.studies.tiny import FRAMES, NODES, SQUEEZE, cube, diverging_case, file_scene, tiny_case, write_obj
 
@@ -123,12 +124,38 @@ def test_out_of_time(monkeypatch):
     assert np.isnan(record.fields["volume"].values[1:]).all()
 
 
-@pytest.mark.parametrize(("smallest", "status"), [(0.1, Status.OK), (0.0, Status.INVERTED), (-0.3, Status.INVERTED)])
-def test_ending_inside_out(ended, smallest, status):
+FOLDS = [(FOLDED, Status.OK), (0.999 * FOLDED, Status.FOLDED), (0.0, Status.INVERTED), (-0.3, Status.INVERTED)]
+SHAPED, MOVING = InitialConditions(scatter=0.1), InitialConditions(speed=((0.0, 1.0, 0.0), (0.0,) * 3, (0.0,) * 3))
+
+
+def at_frames(ended, frames, start=None):
+    """Status and message of the run with least J of these frames, from a start."""
     case, _, history = ended
-    verdict, message = status_of(case, replace(history, min_j=np.append(history.min_j[:-1], smallest)))
-    assert verdict == status
-    assert ("inverted at the end" in message) == (status == Status.INVERTED)
+    min_j = history.min_j.copy()
+    for frame, least in frames.items():
+        min_j[frame] = least
+    return status_of(case.replaced(scene=replace(case.scene, start=start)), replace(history, min_j=min_j))
+
+
+@pytest.mark.parametrize(("least", "status"), FOLDS)
+@pytest.mark.parametrize("start", [None, MOVING], ids=["at rest", "moving"])
+def test_an_element_that_folds_in_any_frame_counts(ended, start, least, status):
+    for frame in (0, 2, FRAMES - 1):
+        verdict, message = at_frames(ended, {frame: least}, start)
+        assert verdict == status
+        assert (f"is {status} after 1 of {FRAMES} frames (least J {least:.3g};" in message) == (status != Status.OK)
+
+
+def test_of_folded_and_inverted_frames_the_inverted_count(ended):
+    verdict, message = at_frames(ended, {0: 0.05, 1: -0.2, 3: -0.4})
+    assert verdict == Status.INVERTED and f"after 2 of {FRAMES} frames (least J -0.4;" in message
+
+
+@pytest.mark.parametrize(("least", "status"), FOLDS)
+def test_a_body_that_starts_out_of_shape_may_fold_on_its_way_back(ended, least, status):
+    assert at_frames(ended, {0: least, FRAMES - 2: least}, SHAPED) == (Status.OK, "")
+    verdict, message = at_frames(ended, {FRAMES - 1: least}, SHAPED)
+    assert verdict == status and (f"is {status} at the end" in message) == (status != Status.OK)
 
 
 @pytest.mark.parametrize(("off", "status"), [(0.009, Status.OK), (-0.011, Status.DRIFTED), (0.05, Status.DRIFTED)])

@@ -58,10 +58,10 @@ def test_what_diverged_or_never_ran_is_not_timed(results):
     assert not timing_file(results, "tiny", diverging_case()).exists()
     assert not can_be_timed(results, diverging_case())
     assert not can_be_timed(results, tiny_case(dt_fraction=0.3))
-    for status in (Status.INVERTED, Status.DRIFTED, Status.TIMED_OUT, Status.FAILED):
+    for status in (Status.FOLDED, Status.INVERTED, Status.DRIFTED, Status.TIMED_OUT, Status.FAILED):
         path = case_path(results, "tiny", KEPT)
         write_record(path, replace(read_record(path), status=status))
-        assert can_be_timed(results, KEPT) == (status in (Status.INVERTED, Status.DRIFTED))
+        assert can_be_timed(results, KEPT) == (status in (Status.FOLDED, Status.INVERTED, Status.DRIFTED))
 
 
 def test_methods_of_one_body_take_turns(results, monkeypatch):
