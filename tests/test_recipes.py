@@ -126,7 +126,8 @@ def test_an_added_scene_keeps_the_contract(recipe, add):
     assert hold(test_library, "scene", scene=[scene], kind=("tetrahedral", "surface")) >= 7
     assert scene not in JUDGED
     record = measure(Case(scene, TetrahedralBody(nodes=100), frames=10))
-    assert record.status in (Status.OK, Status.INVERTED), record.message  # so few nodes invert under their weight
+    # So few nodes fold under their weight.
+    assert record.status in (Status.OK, Status.FOLDED, Status.INVERTED), record.message
     weight = scene.tissue.density * record.attributes["rest_volume"] * 9.81
     assert record.fields["contact_force"].values[-1].sum(axis=0)[2] == pytest.approx(weight, rel=0.02)
 

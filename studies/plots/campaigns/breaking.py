@@ -14,6 +14,7 @@ from studies.plots.style.style import (
     BLACK,
     GREEN,
     GREY,
+    MUTED,
     ORANGE,
     PURPLE,
     SKY,
@@ -27,7 +28,7 @@ from studies.plots.style.style import (
 TITLE = "Which trials methods survive: random bodies, steps, starts and surroundings"
 LOOKS = {
     "ok": (GREEN, ""),
-    "folded": (PURPLE, ""),
+    "folded": (MUTED[5], "oooo"),
     "inverted": (PURPLE, "////"),
     "drifted": (YELLOW, "...."),
     "penetrated": (ORANGE, "xxxx"),

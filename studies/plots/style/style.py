@@ -64,7 +64,7 @@ SPARE_LOOKS: tuple[tuple[LineStyleType, str], ...] = (
 """Lines and markers of other bodies, in the order of appearance; each dash pattern fits into a legend entry."""
 STATUS_LOOKS: dict[Status, tuple[str, str]] = {
     Status.OK: (GREEN, "o"),
-    Status.FOLDED: (PURPLE, "<"),
+    Status.FOLDED: (MUTED[5], "<"),
     Status.INVERTED: (PURPLE, "v"),
     Status.DRIFTED: (YELLOW, "D"),
     Status.DIVERGED: (BLACK, "X"),
