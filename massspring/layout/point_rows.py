@@ -8,16 +8,16 @@ from massspring.body.points import FAR, NEAR, PointVolumes
 from massspring.kernels.points.arrays import AREAS, BLOCK, CORNERS, POINTS, ROWS, SUMS, PointRows
 from massspring.layout.facet_rows import facet_rows
 from massspring.layout.sell_chunks import aligned
+from massspring.layout.volume_inverse import coarser, inverse_at_rest, middles
 
-SHIFT = 1e-6
-"""Added to the diagonal of the scaled S, so that its inverse stays bounded if volumes depend on each other."""
 REAL = np.dtype(np.float64)
 
 
 def point_rows(body: Body, volumes: PointVolumes, inverse_mass: np.ndarray) -> PointRows:
     """The arrays of `volumes` on `body`; `inverse_mass` (n,) [1/kg] is 0 at held nodes."""
     m, n, blocks = volumes.count, body.node_count, -(-len(volumes.cells) // BLOCK)
-    diagonal, scale, inverse = inverse_at_rest(_compliance(volumes.jacobian(body.rest), inverse_mass))
+    schur = _compliance(volumes.jacobian(body.rest), inverse_mass)
+    diagonal, inverse = inverse_at_rest(schur, coarser(volumes), middles(volumes, body.rest))
     closed = np.empty((0, 3), dtype=np.uint32) if volumes.closed is None else volumes.closed.triangles
     node_start, node_entry = _entries(volumes.cells, n, 3)
     volume_start, volume_entry = _entries(volumes.corner_volume, volumes.tissue_count, 1)
@@ -45,8 +45,6 @@ def point_rows(body: Body, volumes: PointVolumes, inverse_mass: np.ndarray) -> P
         push=aligned((n, 3), REAL),
         diagonal=diagonal,
         inverse=inverse,
-        scale=scale,
-        scaled=aligned((m,), np.dtype(np.float32)),
         node_vector=aligned((n, 4), REAL),
         field=aligned((n, 3), REAL),
         moved=aligned((n, 3), REAL),
@@ -81,18 +79,3 @@ def _entries(table: np.ndarray, count: int, components: int) -> tuple[np.ndarray
     order = np.argsort(table.ravel(), kind="stable")
     start = np.concatenate([[0], np.cumsum(np.bincount(table.ravel(), minlength=count))])
     return start.astype(np.uint32), place[order].astype(np.uint32)
-
-
-def inverse_at_rest(schur: csr_array | np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """(S_rr (m,), 1/√S_rr (m,), inverse of S scaled to a diagonal of 1, (m, m) float32) of a matrix S (m, m).
-
-    For a volume whose nodes are all held S_rr and 1/√S_rr are 0.
-    """
-    whole = schur if isinstance(schur, np.ndarray) else schur.toarray()
-    diagonal = np.diag(whole).copy()
-    able = diagonal > 0.0
-    scale = np.where(able, 1.0 / np.sqrt(np.where(able, diagonal, 1.0)), 0.0)
-    inverse = np.linalg.inv(scale[:, None] * whole * scale + np.diag(np.where(able, SHIFT, 1.0)))
-    symmetric = aligned(inverse.shape, np.dtype(np.float32))
-    symmetric[:] = 0.5 * (inverse + inverse.T)
-    return diagonal, scale, symmetric

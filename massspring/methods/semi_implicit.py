@@ -22,11 +22,12 @@ from scipy.sparse import csr_array
 from scipy.sparse.linalg import splu
 
 from massspring.body.body import Body
+from massspring.body.points import PointVolumes
 from massspring.kernels.arrays.layout import Accuracy, BoundaryConditions, Model
 from massspring.kernels.points.arrays import PointRows
 from massspring.layout.allocate import start
-from massspring.layout.point_rows import inverse_at_rest
 from massspring.layout.state import State
+from massspring.layout.volume_inverse import coarser, inverse_at_rest, middles
 from massspring.methods.capabilities import Capabilities
 from massspring.methods.families.points import SpringFactor, point_volumes_frame
 from massspring.methods.implicit.factor import constant_matrix, triangular
@@ -52,7 +53,10 @@ class SemiImplicit(Method):
 
     def start(self, body: Body, attachments: tuple[Attachment, ...] = (), v: np.ndarray | None = None) -> State:
         """The body at rest, or with velocities `v` (n, 3) [m/s], and no matrix factored yet."""
-        return start(body, attachments, v, memory=Prepared(body.kept.jacobian(body.rest), {}))
+        kept = body.kept
+        assert isinstance(kept, PointVolumes)  # other bodies are refused
+        memory = Prepared(kept.jacobian(body.rest), coarser(kept), middles(kept, body.rest), {})
+        return start(body, attachments, v, memory=memory)
 
     def advance(self, state: State, boundary: BoundaryConditions) -> State:
         after = begin_frame(state, boundary)
@@ -69,17 +73,23 @@ class Prepared:
 
     jacobian: csr_array
     """J at rest [m²], (m, 3n)."""
+    coarse: csr_array
+    """Of the volumes, (m, c) (layout.volume_inverse)."""
+    middle: np.ndarray
+    """Of the volumes [m], (m, 3)."""
     factors: dict[tuple[float, float], tuple[SpringFactor, Any]]
 
     def at(self, model: Model, rows: PointRows, dt: float, damping: float) -> tuple[SpringFactor, PointRows]:
         """The factor for steps of `dt` [s] with `damping` [1/s], and the rows with S⁻¹ for that factor."""
         if (dt, damping) not in self.factors:
-            self.factors[dt, damping] = _factored(self.jacobian, model, dt, damping)
-        implicit, (diagonal, scale, inverse) = self.factors[dt, damping]
-        return implicit, rows._replace(diagonal=diagonal, scale=scale, inverse=inverse)
+            implicit, schur = _factored(self.jacobian, model, dt, damping)
+            self.factors[dt, damping] = implicit, inverse_at_rest(schur, self.coarse, self.middle)
+        implicit, (diagonal, inverse) = self.factors[dt, damping]
+        return implicit, rows._replace(diagonal=diagonal, inverse=inverse)
 
 
-def _factored(jacobian: csr_array, model: Model, dt: float, damping: float) -> tuple[SpringFactor, Any]:
+def _factored(jacobian: csr_array, model: Model, dt: float, damping: float) -> tuple[SpringFactor, np.ndarray]:
+    """The factor, and S = J A⁻¹ Jᵀ at rest, (m, m)."""
     matrix = constant_matrix(model, dt, damping)
     free, held = (np.flatnonzero(mask) for mask in (model.inverse_mass > 0.0, model.inverse_mass == 0.0))
     inner = csr_array(matrix[free][:, free])
@@ -96,4 +106,4 @@ def _factored(jacobian: csr_array, model: Model, dt: float, damping: float) -> t
     solve = splu(inner.tocsc()).solve
     components = [csr_array(jacobian[:, axis::3])[:, free].toarray() for axis in range(3)]
     schur = sum(part @ solve(np.ascontiguousarray(part.T)) for part in components)
-    return implicit, inverse_at_rest(np.asarray(schur))
+    return implicit, np.asarray(schur)

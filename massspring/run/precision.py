@@ -13,7 +13,7 @@ from massspring.methods.capabilities import No
 from massspring.methods.method import Method
 
 Precision = Literal["float64", "float32"]
-KEPT_DOUBLE = frozenset({"sums", "matrix", "scale", *OF_EACH_VOLUME})
+KEPT_DOUBLE = frozenset({"sums", "matrix", "scale", "coarse_scale", "moment", *OF_EACH_VOLUME})
 """Arrays that stay float64: sums over many nodes and the systems solved with them. They are short and cost no time."""
 
 

@@ -9,6 +9,8 @@ from massspring.kernels.jit.by_address import by_address
 BLOCK = 16
 """Elements per block: a multiple of the lanes of a vector register."""
 NODES, POINTS, CORNERS = 10, 4, 4
+NEAR_SIZE = 8
+"""Volumes of a cluster of the preconditioner: larger blocks have more numbers that do not count."""
 ROWS, AREAS = 3 * NODES, 9
 """Rows of an element: x, y, z of every node; rows of a point in `area`: x, y, z of three corners."""
 SUMS = ROWS + AREAS
@@ -58,6 +60,39 @@ class FacetRows(NamedTuple):
     """Scratch: velocities of the points of a facet [m/s], (p, 3)."""
     change: np.ndarray
     """Scratch: changes of the forces on them [N], (p, 3)."""
+
+
+@by_address
+class Inverse(NamedTuple):
+    """S⁻¹ at rest of m volumes, nearly: P C Pᵀ over c vertices and closed surfaces, and blocks R between clusters of
+    near volumes. It need not be exact."""
+
+    coarse_start: np.ndarray
+    """First entry of each volume in `coarse` and `weight`, (m + 1,) uint32."""
+    coarse: np.ndarray
+    """Vertex or closed surface of each entry of P, uint32."""
+    weight: np.ndarray
+    """The entries of P [1]."""
+    far: np.ndarray
+    """C over `coarse_scale` on both sides, (c, c) float32."""
+    coarse_scale: np.ndarray
+    """√C_vv [√(kg/m⁴)], (c,)."""
+    scale: np.ndarray
+    """1/√S_rr [√(kg/m⁴)], 0 for what nothing can push, (m,)."""
+    order: np.ndarray
+    """Volumes cluster by cluster, NEAR_SIZE in each, in the last perhaps fewer, (m,) uint32."""
+    near_start: np.ndarray
+    """First block of each cluster, (b + 1,) uint32."""
+    near_cluster: np.ndarray
+    """The cluster that each block couples to, uint32; none if C alone is S⁻¹."""
+    near: np.ndarray
+    """The blocks of R over `scale` on both sides, 0 beyond the last volume, (NEAR_SIZE q, NEAR_SIZE) float32."""
+    moment: np.ndarray
+    """Scratch: Pᵀ of the residual, then C Pᵀ of it, (c,)."""
+    scaled: np.ndarray
+    """Scratch: the scaled moment, (c,) float32."""
+    part: np.ndarray
+    """Scratch: the scaled residual by cluster, and in the last row a product, (b + 1, NEAR_SIZE) float32."""
 
 
 @by_address
@@ -118,12 +153,8 @@ class PointRows(NamedTuple):
     """Residual of the right-hand side with the current multipliers [m³/s²], (m,)."""
     diagonal: np.ndarray
     """S_rr at rest without contact [m⁴/kg], (m,); 0 for what nothing can push."""
-    inverse: np.ndarray
-    """Inverse of S at rest after S is scaled to a diagonal of 1: a preconditioner, (m, m) float32."""
-    scale: np.ndarray
-    """1/√S_rr [√(kg/m⁴)], 0 for what nothing can push, (m,)."""
-    scaled: np.ndarray
-    """Scratch of the preconditioner, (m,) float32."""
+    inverse: Inverse
+    """The preconditioner."""
     search: np.ndarray
     """(m,)."""
     image: np.ndarray

@@ -8,10 +8,11 @@ from massspring.kernels.constraint.one_volume import limited_error, surely_short
 from massspring.kernels.constraint.schur import along, beyond, inner_product
 from massspring.kernels.contact.face_pairs import part_faces
 from massspring.kernels.contact.node_contact import after_contact, allowed
-from massspring.kernels.jit.decorators import compiled, njit_exposed, njit_inlined, njit_lean, njit_reassociated
+from massspring.kernels.jit.decorators import compiled, njit_inlined, njit_lean
 from massspring.kernels.jit.flat import flat
 from massspring.kernels.jit.vec3 import add_to, plus, put, row, times
 from massspring.kernels.points.elements import push_elements, push_of, times_into
+from massspring.kernels.points.precondition import precondition_into
 
 
 @compiled
@@ -100,27 +101,6 @@ def add_response(model, nodes, rows, implicit, dt):
         add_to(nodes.force, i, row(rows.field, i))
 
 
-@njit_reassociated
-def product_of(row, vector):
-    """row · vector in single precision: it need not be exact."""
-    total = row[0] * vector[0]
-    for k in range(1, row.shape[0]):
-        total += row[k] * vector[k]
-    return total
-
-
-@njit_exposed
-def precondition_into(rows, residual, product):
-    """z = S⁻¹ residual with S at rest, which does not depend on the rotation of the body; returns residual · z."""
-    scale, scaled, rho = rows.scale, rows.scaled, 0.0
-    for r in range(scale.shape[0]):
-        scaled[r] = scale[r] * residual[r]
-    for r in range(scale.shape[0]):
-        product[r] = scale[r] * product_of(flat(rows.inverse, r, r + 1), scaled)
-        rho += residual[r] * product[r]
-    return rho
-
-
 @njit_lean
 def solve_iteratively(frame, rows, implicit, most, pairs=None):
     """lam += S⁻¹ rhs by conjugate gradients (eq. 8.4).
@@ -135,7 +115,7 @@ def solve_iteratively(frame, rows, implicit, most, pairs=None):
             residual[r], allowed[r] = 0.0, math.inf
     before, iteration = math.inf, 0
     while iteration < most and beyond(residual, allowed) > 0:
-        rho = precondition_into(rows, residual, image)
+        rho = precondition_into(rows.inverse, residual, image)
         keep = rho / before
         for r in range(search.shape[0]):
             search[r] = image[r] + keep * search[r]

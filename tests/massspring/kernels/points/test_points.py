@@ -7,9 +7,11 @@ from scipy.sparse import diags_array
 from massspring import Attachment, Body, Clock, ImplicitVolume, Setup, quadratic_body
 from massspring.body.points import PointVolumes
 from massspring.kernels.points.elements import measure_into, push_into
-from massspring.kernels.points.solve import apply_schur, precondition_into, solve_iteratively
+from massspring.kernels.points.precondition import precondition_into
+from massspring.kernels.points.solve import apply_schur, solve_iteratively
+from massspring.layout import volume_inverse
 from massspring.layout.facet_rows import facet_rows, facet_rule
-from massspring.layout.point_rows import SHIFT
+from massspring.layout.volume_inverse import SHIFT
 from tests.massspring.conftest import SOFT
 from tests.massspring.quadratic import curved_block, hollow_ball, jiggled, local_force, quadratic_block
 
@@ -60,17 +62,37 @@ def test_the_schur_complement_is_that_of_numpy_with_held_nodes(body):
 
 def test_the_preconditioner_is_the_inverse_at_rest(body):
     """In single precision: six digits of the condition of S are left."""
+    shifted, inverse = at_rest(body)
+    residual, product = np.random.default_rng(5).standard_normal(len(shifted)), np.zeros(len(shifted))
+    rho = precondition_into(inverse, residual, product)
+    assert rho == pytest.approx(float(residual @ product), rel=1e-12) and rho > 0.0
+    close(shifted @ product, residual, 1e-6 * np.linalg.cond(inverse.far))
+
+
+def test_on_two_levels_it_is_nearly_the_inverse_and_positive_definite(monkeypatch):
+    """Though between many clusters blocks are left out."""
+    monkeypatch.setattr(volume_inverse, "DENSE", 0)
+    shifted, inverse = at_rest(hollow_ball(mixed=True))
+    clusters = len(inverse.near_start) - 1
+    assert 2 * clusters < len(inverse.near_cluster) < 0.8 * clusters**2
+    answers = np.zeros_like(shifted)
+    for unit, answer in zip(np.eye(len(shifted)), answers, strict=True):
+        precondition_into(inverse, unit, answer)
+    close(answers, answers.T, 1e-6)
+    scale = np.sqrt(np.diag(shifted))
+    assert np.linalg.eigvalsh(scale[:, None] * answers * scale)[0] > 0.1
+    size = np.sqrt(np.linalg.eigvals(answers @ shifted).real)
+    assert size.max() / size.min() < 1.5
+
+
+def at_rest(body: Body):
+    """S at rest with its shift, some nodes held, and its preconditioner."""
     held = np.arange(0, body.node_count, 7)
     volumes, rows, _, frame = prepared(body, held)
-    inverse_mass = frame.model.inverse_mass
     j = volumes.jacobian(body.rest)
-    schur = (j @ diags_array(np.repeat(inverse_mass, 3)) @ j.T).toarray()
+    schur = (j @ diags_array(np.repeat(frame.model.inverse_mass, 3)) @ j.T).toarray()
     assert np.allclose(rows.diagonal, np.diag(schur), rtol=1e-12)
-    shifted = schur + SHIFT * np.diag(np.diag(schur))
-    residual, product = np.random.default_rng(5).standard_normal(volumes.count), np.zeros(volumes.count)
-    rho = precondition_into(rows, residual, product)
-    assert rho == pytest.approx(float(residual @ product), rel=1e-12) and rho > 0.0
-    close(shifted @ product, residual, 1e-6 * np.linalg.cond(rows.inverse))
+    return schur + SHIFT * np.diag(np.diag(schur)), rows.inverse
 
 
 def test_conjugate_gradients_solve_for_every_volume(body):
@@ -94,7 +116,7 @@ def test_volumes_whose_nodes_are_all_held_are_left_out(body):
     held = np.unique(volumes.cells[around])
     _, rows, _, frame = prepared(body, held)
     dead = rows.diagonal == 0.0
-    assert dead[0] and np.isfinite(rows.inverse).all() and (rows.scale[dead] == 0.0).all()
+    assert dead[0] and np.isfinite(rows.inverse.far).all() and (rows.inverse.scale[dead] == 0.0).all()
     rows.right[:], rows.lam[:], rows.allowed[:] = 1.0, 3.0, 1e-9
     if not dead.all():
         assert solve_iteratively(frame, rows, None, 200) > 0
