@@ -27,6 +27,7 @@ def point_rows(body: Body, volumes: PointVolumes, inverse_mass: np.ndarray) -> P
         own=float(NEAR),
         other=float(FAR),
         bulk=body.local_bulk,
+        rest_pressure=body.rest_pressure,
         corner_volume=_in_blocks(volumes.corner_volume.astype(np.uint32)),
         node_start=node_start,
         node_entry=node_entry,

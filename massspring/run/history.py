@@ -51,6 +51,8 @@ class History:
     """Positions after those frames [m], (s, n, 3)."""
     final: np.ndarray
     """Positions after the last good frame [m], (n, 3)."""
+    steps: np.ndarray
+    """Of each frame, (F,) int64; 0 after an early end."""
     frame_ns: np.ndarray
     """Wall time of each frame's steps [ns], (F,); 0 after an early end."""
     outcome: str
@@ -185,7 +187,7 @@ class Recorder:
         self.contact_force = np.full((frames, len(obstacles), 3), np.nan)
         self.penetration = np.full((frames, len(obstacles)), np.nan)
         self.held_force = np.full((frames, attachments, 3), np.nan)
-        self.frame_ns = np.zeros(frames, dtype=np.int64)
+        self.steps, self.frame_ns = np.zeros(frames, dtype=np.int64), np.zeros(frames, dtype=np.int64)
         self.keep = keep
         self.kept: dict[int, np.ndarray] = {}
         self.final = body.rest
@@ -193,8 +195,8 @@ class Recorder:
         self.limited = 0
         self.passages: list[Passage] = []
 
-    def record(self, frame: int, state: State, elapsed_ns: int, numbers: Numbers | None = None) -> None:
-        """Records the state after frame number `frame` (0, 1, …); `numbers` maps to it from the last body, None after
+    def record(self, frame: int, state: State, steps: int, elapsed_ns: int, numbers: Numbers | None = None) -> None:
+        """Records the state after frame number `frame` (0, 1, …) of so many `steps`; `numbers` maps to it from the last body, None after
         the last event."""
         x = state.x.astype(np.float64, copy=False)
         x = x if numbers is None else numbers.carried(x)
@@ -214,7 +216,7 @@ class Recorder:
                 depth = -obstacle.gap(x[self.surface_nodes], t).min()
             self.penetration[frame, o] = max(0.0, depth)
         self.held_force[frame] = state.diagnostics.held_impulse / self.clock.frame
-        self.frame_ns[frame] = elapsed_ns
+        self.steps[frame], self.frame_ns[frame] = steps, elapsed_ns
         self.singular += int(state.diagnostics.singular[0])
         self.limited += int(state.diagnostics.limited[0])
         self.iterations[frame] = state.diagnostics.iterations
@@ -254,6 +256,7 @@ class Recorder:
             snapshot_frames=np.array(frames, dtype=np.int64),
             snapshots=np.array([self.kept[f] for f in frames]).reshape(shape),
             final=self.final,
+            steps=self.steps,
             frame_ns=self.frame_ns,
             outcome=outcome,
             good_frames=good_frames,

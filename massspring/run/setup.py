@@ -174,7 +174,6 @@ class Setup:
         """The boundary conditions that are the same in all frames."""
         solids = self.solids
         return {
-            "dt": self.clock.dt,
             "damping": float(self.damping),
             "gravity": np.asarray(self.gravity, dtype=np.float64),
             "is_plane": np.array([isinstance(o, Plane) for o in solids], dtype=np.bool_),
@@ -183,15 +182,18 @@ class Setup:
             "span": _rows([o.span if isinstance(o, Capsule) else np.zeros(3) for o in solids]),
             "friction": np.array([np.inf if o.friction == "no_slip" else float(o.friction) for o in solids]),
             "rough": any(o.friction != 0 for o in solids),
+            "inside": np.array([touches_inside(o, self.body, self.method) for o in solids], dtype=np.bool_),
         }
 
-    def boundary(self, frame: int, easing: Easing | None = None) -> BoundaryConditions:
+    def boundary(self, frame: int, easing: Easing | None = None, steps: int | None = None) -> BoundaryConditions:
         """The boundary conditions during frame number `frame` (0, 1, …), with positions at the end of each step
-        relative to `origin`."""
-        dt = self.clock.dt
-        t = frame * self.clock.frame + dt * np.arange(1, self.clock.steps + 1)
+        relative to `origin`; `steps`: of this frame, if not as many as of the clock."""
+        steps = self.clock.steps if steps is None else steps
+        dt = self.clock.frame / steps
+        t = frame * self.clock.frame + dt * np.arange(1, steps + 1)
         solids, probes = self.solids, self.probes
         return BoundaryConditions(
+            dt=dt,
             **self._unmoved,
             position=_tracks([o.anchor + o.path(t) for o in solids], len(t)) - self.origin,
             velocity=_tracks([(o.path(t) - o.path(t - dt)) / dt for o in solids], len(t)),
@@ -208,6 +210,16 @@ class Setup:
             factors[:, self.body.kept.names.index(name)] = ramp(t)
         targets = factors * self.body.rest_volumes
         return targets if easing is None else targets + easing.left(t)
+
+
+def touches_inside(obstacle: Obstacle, body: Body, method: Method) -> bool:
+    """Whether an obstacle touches a body at points inside its facets, not at its nodes.
+
+    A plane that all nodes of a facet lie on meets all of the facet, and contact at nodes is solved together with the
+    volumes. A method that moves all nodes at once meets every obstacle at points.
+    """
+    flat = isinstance(obstacle, Plane) and method.capabilities.keeps != "points"
+    return bool(len(body.contact_facets)) and not flat
 
 
 def _rows(vectors: list[np.ndarray]) -> np.ndarray:

@@ -10,6 +10,7 @@ from massspring.body.body import Body
 from massspring.layout.state import State
 from massspring.run.checks import check_loads, check_probes, check_slip
 from massspring.run.history import EXTRA, History, Recorder, passage
+from massspring.run.loaded_steps import LoadedSteps
 from massspring.run.setup import Setup
 from massspring.run.stages import stages_of
 
@@ -48,14 +49,17 @@ def simulate(
     state = now.start
     advance = setup.method.advance
     begun = thread_time_ns()
+    loaded = LoadedSteps(now.setup, state)
     for frame in range(setup.clock.frames):
         if later and frame == later[0].frame:
             begin, before, was = perf_counter_ns(), state, now.setup.body
             now = later.pop(0).entered(state)
             state = now.start
+            loaded = LoadedSteps(now.setup, state)
             recorder.passages.append(passage(before, was, state, now.setup.body, perf_counter_ns() - begin))
         state = now.let_in(state, frame)
-        boundary = now.boundary(frame)
+        steps = loaded.of(state)
+        boundary = now.boundary(frame, steps)
         reason = check_loads(boundary)
         if reason is not None:
             return recorder.stopped(frame, "diverged", reason)
@@ -68,7 +72,7 @@ def simulate(
         reason = check_probes(state, setup.obstacles)
         if reason is not None:
             return recorder.stopped(frame, "blocked", reason)
-        recorder.record(frame, state, elapsed, now.last)
+        recorder.record(frame, state, steps, elapsed, now.last)
         if setup.events:
             recorder.record_targets(frame, now.targets_after(frame), now.last)
         if on_frame is not None:

@@ -14,13 +14,15 @@ AUTO_FRACTION = 0.5
 
 @dataclass(frozen=True)
 class Clock:
-    """F frames of equal length, each of `steps` equal steps."""
+    """F frames of equal length, each of `steps` equal steps, or of more where a load lowers the limit."""
 
     frame: float
     """Length of a frame [s]."""
     frames: int
     steps: int
     """Steps per frame."""
+    limit: StepLimit | None = None
+    """That of the body at rest: as the load lowers it, steps keep their share of it. None: they stay equal."""
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.frame) and self.frame > 0):
@@ -59,7 +61,8 @@ def make_clock(duration: float, frames: int, dt: float | str, limit: StepLimit, 
             f"{frames} frames in {duration} s; a run needs at least one frame and a positive duration"
         )
     frame = duration / frames
-    clock = Clock(frame, frames, max(1, math.ceil(frame / longest - 1e-9)))
+    steps = max(1, math.ceil(frame / longest - 1e-9))
+    clock = Clock(frame, frames, steps, None if beyond_limit else limit)
     if clock.dt > limit.damped and not beyond_limit:
         raise MassSpringError(
             f"dt = {clock.dt:.3g} s lies above the stability limit of {limit.damped:.3g} s; "

@@ -211,6 +211,8 @@ class BoundaryConditions(NamedTuple):
     """Coulomb's coefficient [1], (o,); inf where nothing slips."""
     rough: bool
     """Whether any obstacle has friction."""
+    inside: np.ndarray
+    """Whether an obstacle touches points inside facets; else it touches nodes, (o,) bool."""
     position: np.ndarray
     """Plane points, sphere centres and starts of capsules at the end of each step [m], (q, o, 3)."""
     velocity: np.ndarray

@@ -28,6 +28,8 @@ def activate(model, nodes, contacts, boundary, step, push, count):
         i = contacts.entering[k]
         u, deepest = pushed_velocity(model, nodes, boundary, push, i), 0.0
         for o in range(boundary.radius.shape[0]):
+            if boundary.inside[o]:
+                continue
             s = minus(row(nodes.x, i), row(place, o))
             r = plus(s, times(dt, u))
             depth, n = gap_and_normal(boundary, o, r)
@@ -130,7 +132,7 @@ def enters(model, nodes, boundary, step, push, i):
     y = plus(row(nodes.x, i), times(boundary.dt, pushed_velocity(model, nodes, boundary, push, i)))
     place = boundary.position[step]
     for o in range(boundary.radius.shape[0]):  # noqa: SIM110 — numba compiles no generators
-        if gap_and_normal(boundary, o, minus(y, row(place, o)))[0] < 0.0:
+        if not boundary.inside[o] and gap_and_normal(boundary, o, minus(y, row(place, o)))[0] < 0.0:
             return True
     return False
 

@@ -79,7 +79,7 @@ def activate_edges(model, nodes, contacts, boundary, step, push):
         u = plus(allowed_part(SLIDES, n, u), row(contacts.v_target, i))
         y, deepest = plus(row(nodes.x, i), times(dt, u)), 0.0
         for o in range(boundary.radius.shape[0]):
-            if o + 1 == contacts.contact_id[i]:
+            if o + 1 == contacts.contact_id[i] or boundary.inside[o]:
                 continue
             gap, m = gap_and_normal(boundary, o, minus(y, row(place, o)))
             edge = cross(n, m)

@@ -14,7 +14,7 @@ from massspring.kernels.jit.vec3 import dot, minus, over, plus, row, times
 
 @njit_inlined
 def predicted_gaps_into(model, nodes, contacts, boundary, step, push):
-    """gap_i = min over obstacles of the distance of y = x + dt (v* + dt W f) [m], f the push (eq. 3.7).
+    """gap_i = min over the obstacles that touch nodes of the distance of y = x + dt (v* + dt W f) [m], f the push (eq. 3.7).
 
     Of all nodes, those that nothing can touch among them.
     """
@@ -26,6 +26,8 @@ def predicted_gaps_into(model, nodes, contacts, boundary, step, push):
     for i in range(n):
         predicted_gap[i] = math.inf
     for o in range(boundary.radius.shape[0]):
+        if boundary.inside[o]:
+            continue
         place, span, radius = boundary.position[step, o], boundary.span[o], real(boundary.radius[o])
         p = real(place[0]), real(place[1]), real(place[2])
         if boundary.is_plane[o]:

@@ -111,7 +111,9 @@ class PointRows(NamedTuple):
     """ρ of the corner next to a point; `other` of each of the three others."""
     other: float
     bulk: float
-    """b [Pa] of the pressure −b (J_q − 1) at the points."""
+    """b [Pa] of the pressure −b (J_q − 1) at points with the pressure of rest."""
+    rest_pressure: float
+    """[Pa]; above it b rises."""
     corner_volume: np.ndarray
     """The volume of each corner, (4 b, BLOCK) uint32."""
     node_start: np.ndarray
@@ -133,7 +135,7 @@ class PointRows(NamedTuple):
     area: np.ndarray
     """Scratch: w_q cof F_q ∇b_i of three corners [m²], (36 b, BLOCK)."""
     stretch: np.ndarray
-    """Scratch: −b (J_q − 1) [Pa], (4 b, BLOCK)."""
+    """Scratch: −b_q (J_q − 1) [Pa], (4 b, BLOCK)."""
     corner_pressure: np.ndarray
     """Scratch: the pressure of each corner's volume [Pa], (4 b, BLOCK)."""
     corner_share: np.ndarray
@@ -148,7 +150,7 @@ class PointRows(NamedTuple):
     lam: np.ndarray
     """Multipliers [Pa], (m,); on entry those of the last step."""
     push: np.ndarray
-    """The force on each node from all volumes and from the local pressure −b (J_q − 1) at the points [N], (n, 3)."""
+    """The force on each node from all volumes and from the local pressure −b_q (J_q − 1) at the points [N], (n, 3)."""
     right: np.ndarray
     """Residual of the right-hand side with the current multipliers [m³/s²], (m,)."""
     diagonal: np.ndarray

@@ -7,7 +7,7 @@ from massspring.kernels.forces.volume import volume_gradient_into
 from massspring.kernels.jit.decorators import njit_inlined, njit_lean
 from massspring.kernels.jit.flat import flat
 from massspring.kernels.jit.vec3 import cross, dot, plus, put, row, times
-from massspring.kernels.jit.vectors import lanes_of, load, save, spread
+from massspring.kernels.jit.vectors import at_least, lanes_of, load, save, spread
 from massspring.kernels.points.arrays import AREAS, BLOCK, CORNERS, POINTS, ROWS, SUMS
 from massspring.kernels.points.slopes import (
     AT_0,
@@ -23,17 +23,45 @@ from massspring.kernels.points.slopes import (
 )
 
 
+BULK_PER_PRESSURE = 2.0 / 3.0
+"""Rise of b with the pressure of a point above that of rest: the least that keeps a point stable under pressure alone, and
+enough in uniaxial and plane compression (docs/theory.md, eq. 8.11b)."""
+
+
 @njit_inlined
-def open_point(rows, block, q, between, lane):
-    """A_i = W_j × W_k / 24 = w_q cof F_q ∇b_i of the positions in the tile into `area`, −b (J_q − 1) into `stretch`,
-    w_q J_q into the tile."""
+def name_pressures(rows, p):
+    """The pressures `p` (m,) [Pa] of the volumes at the corners of all elements, into `corner_pressure`."""
+    pressure, volume = (
+        flat(rows.corner_pressure, 0, rows.corner_pressure.shape[0]),
+        flat(rows.corner_volume, 0, rows.corner_volume.shape[0]),
+    )
+    for e in range(pressure.shape[0]):
+        pressure[e] = p[volume[e]]
+
+
+@njit_inlined
+def pressures_at(rows, block, lane):
+    """p_q = Σ_r ρ_rq p_r [Pa] at the four points of the elements of a block."""
+    first, own, other = POINTS * block, spread(rows.own - rows.other, rows.tile), spread(rows.other, rows.tile)
+    p0, p1 = load(rows.corner_pressure, first, lane), load(rows.corner_pressure, first + 1, lane)
+    p2, p3 = load(rows.corner_pressure, first + 2, lane), load(rows.corner_pressure, first + 3, lane)
+    all_of = other * (p0 + p1 + p2 + p3)
+    return all_of + own * p0, all_of + own * p1, all_of + own * p2, all_of + own * p3
+
+
+@njit_inlined
+def open_point(rows, block, q, pressure, between, lane):
+    """A_i = W_j × W_k / 24 = w_q cof F_q ∇b_i of the positions in the tile into `area`, −b_q (J_q − 1) into `stretch`,
+    w_q J_q into the tile; b_q from the pressure of the point [Pa]."""
     w1, w2, w3 = slopes(rows, between, lane)
     part, point = spread(1.0 / 24.0, rows.tile), block * POINTS + q
     a1, a2, a3 = times(part, cross(w2, w3)), times(part, cross(w3, w1)), times(part, cross(w1, w2))
     now = dot(w1, a1)
     stretch, tile = flat(rows.stretch, point, point + 1), flat(rows.tile, SUMS + q, SUMS + q + 1)
     ratio = now * load(rows.per_weight, point, lane)
-    save(spread(-rows.bulk, rows.tile) * (ratio - spread(1, rows.tile)), stretch, lane)
+    above = at_least(pressure - spread(rows.rest_pressure, rows.tile), spread(0, rows.tile))
+    bulk = spread(rows.bulk, rows.tile) + spread(BULK_PER_PRESSURE, rows.tile) * above
+    save(bulk * (spread(1, rows.tile) - ratio), stretch, lane)
     save(now, tile, lane)
     area = flat(rows.area, AREAS * point, AREAS * (point + 1))
     save_three(a1, area, lane)
@@ -69,15 +97,18 @@ def add_corners(rows, out):
 
 @njit_lean
 def measure_into(rows, x, padded):
-    """A_i and −b (J_q − 1) of all points, V_r [m³], and dV/dx of the closed surface; `padded` (n, 4) holds `x`."""
+    """A_i and −b_q (J_q − 1) of all points, V_r [m³], and dV/dx of the closed surface; `padded` (n, 4) holds `x`. b_q is
+    that of the multipliers `rows.lam`."""
+    name_pressures(rows, rows.lam)
     for block in range(blocks_of(rows)):
         gather_block(rows, padded, block)
         for lane in range(0, BLOCK, lanes_of(padded)):
             open_block(rows, lane)
-            open_point(rows, block, 0, AT_0, lane)
-            open_point(rows, block, 1, AT_1, lane)
-            open_point(rows, block, 2, AT_2, lane)
-            open_point(rows, block, 3, AT_3, lane)
+            p0, p1, p2, p3 = pressures_at(rows, block, lane)
+            open_point(rows, block, 0, p0, AT_0, lane)
+            open_point(rows, block, 1, p1, AT_1, lane)
+            open_point(rows, block, 2, p2, AT_2, lane)
+            open_point(rows, block, 3, p3, AT_3, lane)
             share_among_corners(rows, block, lane)
     add_corners(rows, rows.volume)
     if rows.closed_nodes.shape[0] > 0:
@@ -87,13 +118,8 @@ def measure_into(rows, x, padded):
 
 @njit_inlined
 def push_block(rows, block, lane, stretched):
-    """f_a = Σ_q p_q D_qa [N] of the elements of a block, p_q = Σ_r ρ_rq p_r and, where `stretched`, −b (J_q − 1)."""
-    first = POINTS * block
-    own, other = spread(rows.own - rows.other, rows.tile), spread(rows.other, rows.tile)
-    p0, p1 = load(rows.corner_pressure, first, lane), load(rows.corner_pressure, first + 1, lane)
-    p2, p3 = load(rows.corner_pressure, first + 2, lane), load(rows.corner_pressure, first + 3, lane)
-    all_of = other * (p0 + p1 + p2 + p3)
-    p0, p1, p2, p3 = all_of + own * p0, all_of + own * p1, all_of + own * p2, all_of + own * p3
+    """f_a = Σ_q p_q D_qa [N] of the elements of a block, p_q = Σ_r ρ_rq p_r and, where `stretched`, −b_q (J_q − 1)."""
+    first, (p0, p1, p2, p3) = POINTS * block, pressures_at(rows, block, lane)
     if stretched:
         p0, p1 = p0 + load(rows.stretch, first, lane), p1 + load(rows.stretch, first + 1, lane)
         p2, p3 = p2 + load(rows.stretch, first + 2, lane), p3 + load(rows.stretch, first + 3, lane)
@@ -137,12 +163,7 @@ def push_along(rows, block, axis, pressure, lane):
 @njit_inlined
 def push_elements(rows, p, stretched):
     """`push_block` of all blocks with pressures `p` (m,) [Pa] of the volumes."""
-    pressure, volume = (
-        flat(rows.corner_pressure, 0, rows.corner_pressure.shape[0]),
-        flat(rows.corner_volume, 0, rows.corner_volume.shape[0]),
-    )
-    for e in range(pressure.shape[0]):
-        pressure[e] = p[volume[e]]
+    name_pressures(rows, p)
     for block in range(blocks_of(rows)):
         for lane in range(0, BLOCK, lanes_of(rows.tile)):
             push_block(rows, block, lane, stretched)
@@ -162,7 +183,7 @@ def push_of(rows, force, p, i):
 
 @njit_lean
 def push_into(rows, p):
-    """Jᵀ p and the force of −b (J_q − 1) [N] into `push`, (n, 3), with pressures `p` (m,) [Pa] (eq. 8.12)."""
+    """Jᵀ p and the force of −b_q (J_q − 1) [N] into `push`, (n, 3), with pressures `p` (m,) [Pa] (eq. 8.12)."""
     push_elements(rows, p, True)
     force = flat(rows.element_push, 0, rows.element_push.shape[0])
     for i in range(rows.push.shape[0]):

@@ -167,22 +167,38 @@ def sweep_until_settled(facets, boundary, step, speed, inverse_mass, count):
 
 
 @njit_lean
-def corrections_into(nodes, facets, boundary, step, speed, field, inverse_mass, contact_impulse):
-    """The changes of the forces at all points, as nodal forces [N], into `field` (n, 3). Adds the impulses of the
-    obstacles.
+def corrections_into(nodes, facets, boundary, step, speed, field, inverse_mass):
+    """The changes of the forces at all points, as nodal forces [N], into `field` (n, 3). Returns how many facets are near
+    an obstacle.
 
     `speed` (n, 4): velocities of the nodes under the forces of the last step [m/s]; each correction updates it for the
     following facets.
     """
-    field[:] = 0.0
     count, lost = list_near(facets, nodes, boundary, step, speed)
     if lost >= 0:
         give_back(facets, speed, inverse_mass, boundary.dt, count)
     sweep_until_settled(facets, boundary, step, speed, inverse_mass, count)
+    changes_into(facets, field, count)
+    return count
+
+
+@njit_inlined
+def changes_into(facets, field, count):
+    """Force less `last_force` at the points of the first `count` facets in `near`, as nodal forces [N] (n, 3)."""
+    field[:] = 0.0
     for k in range(count):
         f = facets.near[k]
         for q in range(facets.shape.shape[0]):
             change = minus(force_at(facets, f, q), row(facets.last_force[f], q))
             add_at_point(facets, field, change, f, q)
+
+
+@njit_lean
+def book_points(facets, boundary, step, speed, contact_impulse, count):
+    """Adds the impulses on the points of the first `count` facets in `near` to their obstacles, and moves the anchors of
+    points that slide; `speed` (n, 4): velocities at the end of the step [m/s]."""
+    for k in range(count):
+        f = facets.near[k]
+        for q in range(facets.shape.shape[0]):
             if facets.contact_id[f, q] > 0:
                 book(facets, boundary, step, speed, contact_impulse, f, q)

@@ -31,7 +31,7 @@ def is_far(facets, nodes, boundary, step, f):
     x, node, place = nodes.x, facets.node, boundary.position[step]
     middle = over(plus(plus(row(x, node[f, 0]), row(x, node[f, 1])), row(x, node[f, 2])), 3.0)
     for o in range(boundary.radius.shape[0]):
-        if not gap_and_normal(boundary, o, minus(middle, row(place, o)))[0] > facets.reach[f]:
+        if boundary.inside[o] and not gap_and_normal(boundary, o, minus(middle, row(place, o)))[0] > facets.reach[f]:
             return False
     return True
 
@@ -41,6 +41,8 @@ def deepest(boundary, step, y):
     """The obstacle with the smallest gap at the point y, that gap [m], and its gradient."""
     best, least, normal, place = 0, math.inf, (0.0, 0.0, 0.0), boundary.position[step]
     for o in range(boundary.radius.shape[0]):
+        if not boundary.inside[o]:
+            continue
         gap, n = gap_and_normal(boundary, o, minus(y, row(place, o)))
         if gap < least:
             best, least, normal = o, gap, n

@@ -36,7 +36,7 @@ from massspring.layout.state import State
 from massspring.methods.capabilities import Capabilities, No
 from massspring.methods.elements.laws import LawName, supported, why_not_corotated
 from massspring.methods.elements.tangent import elements_of
-from massspring.methods.families.points import meet_points
+from massspring.methods.families.points import leave_points, meet_points
 from massspring.methods.families.pressure_law import check_modulus
 from massspring.methods.method import Method, begin_frame
 from massspring.world.obstacles import Attachment
@@ -89,7 +89,8 @@ def quadratic_elements_frame(frame, rows, bulk_modulus):
         diagnostics.singular[0] += pressures_into(rows, rows.diagonal, model.rest_lam, bulk_modulus, target)
         push_into(rows, rows.lam)
         end_stage(diagnostics.stage_times, VOLUME)
-        meet_points(frame, step, push, rows, None)
+        _, near = meet_points(frame, step, push, rows, None)
+        leave_points(frame, step, rows, None, near)
         end_step(frame, step, push, 0.0, None)
 
 

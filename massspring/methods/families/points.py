@@ -12,7 +12,7 @@ from massspring.kernels.jit.by_address import by_address
 from massspring.kernels.jit.decorators import njit_inlined, njit_lean
 from massspring.kernels.jit.stage_clock import HELD, INTEGRATION, SEARCH, SPRINGS, VOLUME, end_stage
 from massspring.kernels.points.elements import measure_into, push_into
-from massspring.kernels.points.facet_forces import corrections_into
+from massspring.kernels.points.facet_forces import book_points, corrections_into
 from massspring.kernels.points.facets import last_forces_into
 from massspring.kernels.points.solve import (
     add_response,
@@ -64,22 +64,68 @@ def respond_of_free(model, nodes, implicit, rows):
             nodes.v_star[i, 2] = rows.moved[i, 2]
 
 
+AGREEMENTS = 1
+"""How often contact inside facets and volumes follow each other once more in a step. With none the forces of either
+answer those of the other a step late, which is a negative damping."""
+
+
+@njit_inlined
+def any_touches(boundary, inside):
+    """Whether an obstacle touches points inside facets, or nodes."""
+    for o in range(boundary.inside.shape[0]):  # noqa: SIM110 — numba compiles no generators
+        if boundary.inside[o] == inside:
+            return True
+    return False
+
+
 @njit_inlined
 def meet_points(frame, step, push, rows, implicit):
-    """Contact inside facets, with forces of the last step, or at nodes (eq. 3.7, 9.3–9.5). Returns the most passes of
-    the active set."""
-    facets, boundary, model, nodes = rows.facets, frame.boundary, frame.model, frame.nodes
-    if facets.node.shape[0] == 0:
-        return search_contacts(frame, step, push)
-    if boundary.radius.shape[0] > 0:
-        last_forces_into(nodes, facets, boundary, step, rows.field)
-        add_response(model, nodes, rows, implicit, boundary.dt)
-        pushed_velocity_into(model, nodes, frame.contacts, rows, implicit, boundary.dt)
-        speed, impulse = rows.node_vector, frame.diagnostics.contact_impulse
-        corrections_into(nodes, facets, boundary, step, speed, rows.field, model.inverse_mass, impulse)
-        add_response(model, nodes, rows, implicit, boundary.dt)
+    """Contact at nodes with the push of the last step (eq. 3.7), and inside facets with the forces of the last step (eq.
+    9.3–9.5). Returns the most passes of the active set, and how many facets are near an obstacle."""
+    boundary, inside = frame.boundary, any_touches(frame.boundary, True)
+    if inside:
+        last_forces_into(frame.nodes, rows.facets, boundary, step, rows.field)
+        add_response(frame.model, frame.nodes, rows, implicit, boundary.dt)
+    passes = search_contacts(frame, step, push) if any_touches(boundary, False) else 1
+    return passes, meet_facets(frame, step, rows, implicit) if inside else 0
+
+
+@njit_inlined
+def meet_facets(frame, step, rows, implicit):
+    """Contact inside facets with the pressures as they are. Returns how many facets are near an obstacle."""
+    boundary, model, nodes, speed = frame.boundary, frame.model, frame.nodes, rows.node_vector
+    pushed_velocity_into(model, nodes, frame.contacts, rows, implicit, boundary.dt)
+    near = corrections_into(nodes, rows.facets, boundary, step, speed, rows.field, model.inverse_mass)
+    add_response(model, nodes, rows, implicit, boundary.dt)
+    end_stage(frame.diagnostics.stage_times, SEARCH)
+    return near
+
+
+@njit_inlined
+def leave_points(frame, step, rows, implicit, near):
+    """Books contact inside facets with the velocities at the end of the step."""
+    if near > 0:
+        boundary, model, nodes, speed = frame.boundary, frame.model, frame.nodes, rows.node_vector
+        if boundary.rough:  # only a point that slides needs them
+            pushed_velocity_into(model, nodes, frame.contacts, rows, implicit, boundary.dt)
+        book_points(rows.facets, boundary, step, speed, frame.diagnostics.contact_impulse, near)
         end_stage(frame.diagnostics.stage_times, SEARCH)
-    return 1
+
+
+@njit_inlined
+def keep_volumes(frame, step, rows, implicit, accuracy, push, passes, pairs):
+    """The multipliers with contact inside facets as it is (eq. 8.3, 8.4), in up to `passes` of the active set of nodes.
+    Returns whether an error was capped, and whether a volume with an error had no gradient."""
+    target, limited, idle = frame.boundary.volume_target[step], False, False
+    for sweep in range(passes):
+        limited, idle = set_right_side(frame, rows, implicit, target, accuracy.tolerance, pairs)
+        count = solve_iteratively(frame, rows, implicit, accuracy.most_iterations, pairs)
+        count_iterations(frame.diagnostics, count)
+        if count > 0:
+            push_into(rows, rows.lam)
+        if contacts_stand(frame, step, push, math.inf, sweep + 1 == passes, pairs):
+            break
+    return limited, idle
 
 
 @njit_lean
@@ -90,7 +136,7 @@ def point_volumes_frame(frame, rows, implicit, accuracy, pairs):
     `implicit`: the factor of implicit springs, or None. `pairs`: faces of a cut that may touch, or None.
     """
     model, nodes, boundary, diagnostics = frame.model, frame.nodes, frame.boundary, frame.diagnostics
-    push, limited, idle = Push(rows.push, 1.0), False, False
+    push = Push(rows.push, 1.0)
     open_frame(frame)
     for step in range(boundary.position.shape[0]):
         begin_step(frame, step, False)
@@ -101,16 +147,13 @@ def point_volumes_frame(frame, rows, implicit, accuracy, pairs):
         measure_into(rows, nodes.x, frame.work.padded_positions)
         push_into(rows, rows.lam)
         end_stage(diagnostics.stage_times, VOLUME)
-        target, passes = boundary.volume_target[step], meet_points(frame, step, push, rows, implicit)
+        passes, near = meet_points(frame, step, push, rows, implicit)
         passes = search_pairs(frame, push, passes, pairs)
-        for sweep in range(passes):
-            limited, idle = set_right_side(frame, rows, implicit, target, accuracy.tolerance, pairs)
-            count = solve_iteratively(frame, rows, implicit, accuracy.most_iterations, pairs)
-            count_iterations(diagnostics, count)
-            if count > 0:
-                push_into(rows, rows.lam)
-            if contacts_stand(frame, step, push, math.inf, sweep + 1 == passes, pairs):
-                break
+        limited, idle = keep_volumes(frame, step, rows, implicit, accuracy, push, passes, pairs)
+        for _ in range(AGREEMENTS if near > 0 else 0):
+            near = meet_facets(frame, step, rows, implicit)
+            limited, idle = keep_volumes(frame, step, rows, implicit, accuracy, push, passes, pairs)
+        leave_points(frame, step, rows, implicit, near)
         diagnostics.limited[0] += limited
         diagnostics.singular[0] += idle
         press_pairs(pairs, model, nodes, frame.contacts, push, boundary.dt)

@@ -1,0 +1,72 @@
+"""How many steps a frame takes while a body is under load: pressures raise its largest frequency (docs/theory.md, section
+5)."""
+
+import math
+
+import numpy as np
+from scipy.sparse import csr_array
+
+from massspring.analysis.stability import StepLimit
+from massspring.analysis.stiffness import edge_blocks
+from massspring.kernels.points.arrays import PointRows
+from massspring.kernels.points.elements import measure_into, push_into
+from massspring.layout.state import State
+from massspring.run.setup import Setup
+
+FIRST, FURTHER = 40, 3
+"""Power iterations at rest, and after each frame from the last vector; loads change little in a frame."""
+NUDGE = 1e-7
+"""Largest displacement of a difference of forces, over the size of the body: forces then differ in nine digits."""
+
+
+class LoadedSteps:
+    """The steps of each frame of a set-up: those of its clock, or as many more as the loaded body needs.
+
+    ω_max² of the loaded body is that at rest times the ratio of two estimates by power iteration on differences of the
+    kernels' own forces, volumes free: keeping them lowers no limit (Cauchy interlacing).
+    """
+
+    def __init__(self, setup: Setup, start: State) -> None:
+        self.clock, self.damping = setup.clock, setup.damping
+        self.watches = setup.clock.limit is not None and isinstance(start.rows, PointRows)
+        if not self.watches:
+            return
+        body = setup.inside.body
+        springs = body.springs
+        self.springs = csr_array(edge_blocks(springs.ends, springs.stiffness[:, None, None] * np.eye(3), body.node_count))
+        self.nudge = NUDGE * body.size
+        free = start.model.inverse_mass[:, None]
+        self.vector = free * np.random.default_rng(0).standard_normal((body.node_count, 3))
+        self.at_rest = self._iterated(start, FIRST)
+
+    def of(self, state: State) -> int:
+        """Steps of the next frame, from `state` on."""
+        if not self.watches:
+            return self.clock.steps
+        limit = self.clock.limit
+        rise = math.sqrt(max(self._iterated(state, FURTHER) / self.at_rest, 1.0))
+        loaded = StepLimit(rise * limit.frequency, limit.damping).damped
+        share = self.clock.dt / limit.damped
+        return math.ceil(self.clock.frame / (share * loaded) - 1e-9)
+
+    def _iterated(self, state: State, count: int) -> float:
+        """ω² [1/s²] of the vector after `count` power iterations on M⁻¹ K at `state`."""
+        rows, x, weight = state.rows, state.nodes.x, state.model.inverse_mass[:, None]
+        assert isinstance(rows, PointRows)
+        rows.lam[:] = state.lam + state.model.rest_lam
+        begin, square = self._push(rows, x), 0.0
+        for _ in range(count):
+            q = self.vector
+            scale = self.nudge / np.abs(q).max()
+            force = (self.springs @ q.ravel()).reshape(-1, 3) - (self._push(rows, x + scale * q) - begin) / scale
+            after = weight * force
+            square = float(np.vdot(q, after) / np.vdot(q, q))
+            self.vector = after / np.abs(after).max()
+        return square
+
+    @staticmethod
+    def _push(rows: PointRows, x: np.ndarray) -> np.ndarray:
+        """The force of all volumes and of the local pressure at positions `x` (n, 3) [m], (n, 3) [N]."""
+        measure_into(rows, x, np.column_stack([x, np.zeros(len(x))]))
+        push_into(rows, rows.lam)
+        return rows.push.copy()
