@@ -231,8 +231,12 @@ def _timing(run: Run, quantile: float) -> float:
 
 
 def step_time(run: Run) -> float:
-    """Median frame time over the steps in a frame [µs]; NaN where these are not known."""
-    return 1e-3 * _timing(run, 0.5) / (run.attributes.steps or float("nan"))
+    """Median of frame time over the steps of the frame [µs]; NaN where these are not known."""
+    if run.timing is None:
+        return float("nan")
+    counted = run.fields.frame_steps
+    steps = (run.attributes.steps or float("nan")) if counted is None else counted
+    return 1e-3 * float(np.median(run.timing.frame_ns / steps))
 
 
 def frame_time(run: Run) -> float:

@@ -152,6 +152,7 @@ def _fields(case: Case, prepared: Prepared, history: History) -> dict[str, Field
         "penetration": history.penetration,
         "held_force": history.held_force,
         "iterations": history.iterations,
+        "frame_steps": history.steps,
         "min_j": history.min_j,
         "snapshot_frame": history.snapshot_frames[at],
         **_shown(prepared, history.snapshots[at]),

@@ -76,6 +76,7 @@ class RunFields(Table):
     penetration = array("F o", NUMBER, "m", "depth of the deepest surface node in each obstacle")
     held_force = array("F g 3", NUMBER, "N", "force of each held region on the body, mean of the frame")
     iterations = array("F 2", INDEX, "1", "for the multipliers: sum of the frame, most in a step")
+    frame_steps = optional_array("F", INDEX, "1", "steps of each frame: more than at rest where a load lowers the limit")
     min_j = array("F", NUMBER, "1", "least J of an element, of a quadratic one at its points; NaN without")
     snapshot_frame = array("K", INDEX, "1", "number of the frame after which each snapshot was taken")
     snapshots = array("K n 3", NUMBER, "m", "positions at the scene's checkpoints")
@@ -107,9 +108,9 @@ class RunAttributes(Timed):
     """Of a run."""
 
     rest_volume = value(float, "m^3", "volume of the body at rest")
-    dt = value(float, "s", "time step")
+    dt = value(float, "s", "time step at rest; under load it may be shorter")
     dt_limit = value(float, "s", "stability limit of the time step")
-    steps = value(int, "1", "steps per frame")
+    steps = value(int, "1", "steps per frame at rest")
     frame = value(float, "s", "length of a frame")
     frames = value(int, "1", "frames of the run", "F")
     good_frames = value(int, "1", "frames before an early end")

@@ -24,6 +24,7 @@ from massspring.kernels.jit.stage_clock import (
     new_stage_times,
 )
 from massspring.run.history import EXTRA, Recorder
+from massspring.run.loaded_steps import LoadedSteps
 from massspring.run.simulation import check_state
 from studies.metrics.timing.protocol import pinned
 from studies.metrics.timing.skips import SKIPS
@@ -58,8 +59,9 @@ def run_frames(setup: Setup, state: State, times: StageTimes = UNTIMED, frames: 
     frames = setup.clock.frames if frames is None else frames
     frame_ns, stage_ns = np.zeros(frames), np.zeros((len(ROWS), frames))
     price = end_stage_ns() if times.on[0] else 0.0
+    loaded = LoadedSteps(setup, state)
     for frame in range(frames):
-        boundary = setup.boundary(frame)
+        boundary = setup.boundary(frame, steps=loaded.of(state))
         if times.on[0]:
             times.spent[:], times.ended[:] = 0, 0
         begin = perf_counter_ns()
