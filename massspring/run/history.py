@@ -10,6 +10,7 @@ from massspring.body.body import Body
 from massspring.errors import MassSpringError
 from massspring.kernels.forces.springs import membrane_energy, spring_energy
 from massspring.kernels.probe.arrays import COUNTS
+from massspring.layout.facet_rows import facet_rule
 from massspring.layout.probe_arrays import tip_depth
 from massspring.layout.state import State
 from massspring.world.clock import Clock
@@ -39,8 +40,8 @@ class History:
     contact_force: np.ndarray
     """Mean force of each obstacle on the body during the frame [N], (F, o, 3)."""
     penetration: np.ndarray
-    """Penetration of the deepest surface node into each obstacle at the end of the frame, for a thin probe of the
-    surface [m], (F, o)."""
+    """Penetration of the deepest surface node, or point inside a facet of a quadratic body, into each obstacle at the end
+    of the frame, for a thin probe of the surface [m], (F, o)."""
     held_force: np.ndarray
     """Mean force of each attachment on the body during the frame [N], (F, g, 3)."""
     min_j: np.ndarray
@@ -184,6 +185,7 @@ class Recorder:
         # The impulses of thin probes come last.
         self.rank = sorted(range(len(obstacles)), key=lambda o: isinstance(obstacles[o], Probe))
         self.surface_nodes = body.surface_nodes
+        self.facets = body.contact_facets, facet_rule()[0]
         self.contact_force = np.full((frames, len(obstacles), 3), np.nan)
         self.penetration = np.full((frames, len(obstacles)), np.nan)
         self.held_force = np.full((frames, attachments, 3), np.nan)
@@ -213,7 +215,9 @@ class Recorder:
             if isinstance(obstacle, Probe):
                 depth = tip_depth(obstacle, x, self.body.triangles, t)
             else:
-                depth = -obstacle.gap(x[self.surface_nodes], t).min()
+                facets, shape = self.facets
+                points = np.einsum("qa,fai->fqi", shape, x[facets]).reshape(-1, 3)
+                depth = -min(obstacle.gap(places, t).min() for places in (x[self.surface_nodes], points) if len(places))
             self.penetration[frame, o] = max(0.0, depth)
         self.held_force[frame] = state.diagnostics.held_impulse / self.clock.frame
         self.steps[frame], self.frame_ns[frame] = steps, elapsed_ns

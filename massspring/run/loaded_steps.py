@@ -37,23 +37,24 @@ class LoadedSteps:
         self.nudge = NUDGE * body.size
         free = start.model.inverse_mass[:, None]
         self.vector = free * np.random.default_rng(0).standard_normal((body.node_count, 3))
-        self.at_rest = self._iterated(start, FIRST)
+        self.at_rest = self._iterated(start.moved_to(setup.body.rest), np.zeros_like(start.lam), FIRST)
 
     def of(self, state: State) -> int:
         """Steps of the next frame, from `state` on."""
         if not self.watches:
             return self.clock.steps
         limit = self.clock.limit
-        rise = math.sqrt(max(self._iterated(state, FURTHER) / self.at_rest, 1.0))
+        rise = math.sqrt(max(self._iterated(state, state.lam, FURTHER) / self.at_rest, 1.0))
         loaded = StepLimit(rise * limit.frequency, limit.damping).damped
         share = self.clock.dt / limit.damped
         return math.ceil(self.clock.frame / (share * loaded) - 1e-9)
 
-    def _iterated(self, state: State, count: int) -> float:
-        """ω² [1/s²] of the vector after `count` power iterations on M⁻¹ K at `state`."""
+    def _iterated(self, state: State, lam: np.ndarray, count: int) -> float:
+        """ω² [1/s²] of the vector after `count` power iterations on M⁻¹ K at `state` with pressures `lam` [Pa] above
+        those at rest."""
         rows, x, weight = state.rows, state.nodes.x, state.model.inverse_mass[:, None]
         assert isinstance(rows, PointRows)
-        rows.lam[:] = state.lam + state.model.rest_lam
+        rows.lam[:] = lam + state.model.rest_lam
         begin, square = self._push(rows, x), 0.0
         for _ in range(count):
             q = self.vector

@@ -70,7 +70,7 @@ class Setup:
         around = Surroundings(self.obstacles, len(self.attachments), self.gravity, bool(self.targets), moved)
         check_among(around, self.method)
         check_precision(self.precision, self.method)
-        check_facets(self.precision, self.body, self.solids)
+        check_facets(self.precision, [touches_inside(o, self.body, self.method) for o in self.solids])
         if self.pairs is not None:
             check_face_pairs(self.pairs, self.method, self.attachments, self.precision, bool(self.probes))
         limited = self.method.capabilities.conditionally_stable
@@ -215,11 +215,11 @@ class Setup:
 def touches_inside(obstacle: Obstacle, body: Body, method: Method) -> bool:
     """Whether an obstacle touches a body at points inside its facets, not at its nodes.
 
-    A plane that all nodes of a facet lie on meets all of the facet, and contact at nodes is solved together with the
-    volumes. A method that moves all nodes at once meets every obstacle at points.
+    All of a facet lies on a plane when its nodes do, and contact at nodes is solved together with the volumes. Points
+    follow Coulomb's law more closely, and a method that moves all nodes at once meets every obstacle at points.
     """
-    flat = isinstance(obstacle, Plane) and method.capabilities.keeps != "points"
-    return bool(len(body.contact_facets)) and not flat
+    flat = isinstance(obstacle, Plane) and obstacle.friction in (0.0, "no_slip")
+    return bool(len(body.contact_facets)) and not (flat and method.capabilities.keeps != "points")
 
 
 def _rows(vectors: list[np.ndarray]) -> np.ndarray:

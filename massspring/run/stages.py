@@ -38,8 +38,8 @@ class Stage:
     """For a body with new springs: the number of the spring in each lane of its slices, −1 for none."""
     letting_in: LettingIn | None = None
 
-    def boundary(self, frame: int, steps: int) -> BoundaryConditions:
-        """The boundary conditions during frame number `frame` of the run, in so many steps."""
+    def boundary(self, frame: int, steps: int | None = None) -> BoundaryConditions:
+        """The boundary conditions during frame number `frame` of the run, in so many steps (`Setup.boundary`)."""
         return self.setup.boundary(frame, self.easing, steps)
 
     def targets_after(self, frame: int) -> np.ndarray:

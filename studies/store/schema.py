@@ -73,7 +73,7 @@ class RunFields(Table):
     volume_target = array("F m", NUMBER, "m^3", "what each kept volume should be")
     pressure = array("F m", NUMBER, "Pa", "multiplier of each kept volume in the last step of the frame")
     contact_force = array("F o 3", NUMBER, "N", "force of each obstacle on the body, mean of the frame")
-    penetration = array("F o", NUMBER, "m", "depth of the deepest surface node in each obstacle")
+    penetration = array("F o", NUMBER, "m", "depth of the deepest surface node, or point in a facet, in each obstacle")
     held_force = array("F g 3", NUMBER, "N", "force of each held region on the body, mean of the frame")
     iterations = array("F 2", INDEX, "1", "for the multipliers: sum of the frame, most in a step")
     frame_steps = optional_array("F", INDEX, "1", "steps of each frame: more than at rest where a load lowers the limit")

@@ -178,7 +178,10 @@ class ExplicitElements(Method):
         """The body at rest, or with velocities `v` (n, 3) [m/s], with K [Pa] in its memory."""
         bulk = self.bulk_ratio * body.rest_pressure
         memory = Corotated(body, elements_of(body, bulk)) if self.law == "corotated" else bulk
-        return start(body, attachments, v, memory=memory)
+        state = start(body, attachments, v, memory=memory)
+        if isinstance(state.rows, PointRows):  # a compressible solid's law has a constant b
+            state = replace(state, rows=state.rows._replace(rest_pressure=np.inf))
+        return state
 
     def advance(self, state: State, boundary: BoundaryConditions) -> State:
         after = begin_frame(state, boundary)
