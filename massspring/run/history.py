@@ -40,8 +40,8 @@ class History:
     contact_force: np.ndarray
     """Mean force of each obstacle on the body during the frame [N], (F, o, 3)."""
     penetration: np.ndarray
-    """Penetration of the deepest surface node, or point inside a facet of a quadratic body, into each obstacle at the end
-    of the frame, for a thin probe of the surface [m], (F, o)."""
+    """Penetration of the deepest surface node, or point inside a facet of a quadratic body, into each obstacle at the
+    end of the frame, for a thin probe of the surface [m], (F, o)."""
     held_force: np.ndarray
     """Mean force of each attachment on the body during the frame [N], (F, g, 3)."""
     min_j: np.ndarray
@@ -198,8 +198,8 @@ class Recorder:
         self.passages: list[Passage] = []
 
     def record(self, frame: int, state: State, steps: int, elapsed_ns: int, numbers: Numbers | None = None) -> None:
-        """Records the state after frame number `frame` (0, 1, …) of so many `steps`; `numbers` maps to it from the last body, None after
-        the last event."""
+        """Records the state after frame number `frame` (0, 1, …) of so many `steps`; `numbers` maps to it from the last
+        body, None after the last event."""
         x = state.x.astype(np.float64, copy=False)
         x = x if numbers is None else numbers.carried(x)
         self.volume[frame] = self.volumes.measure(x)
@@ -217,7 +217,8 @@ class Recorder:
             else:
                 facets, shape = self.facets
                 points = np.einsum("qa,fai->fqi", shape, x[facets]).reshape(-1, 3)
-                depth = -min(obstacle.gap(places, t).min() for places in (x[self.surface_nodes], points) if len(places))
+                touched = np.concatenate([x[self.surface_nodes], points])
+                depth = -obstacle.gap(touched, t).min()
             self.penetration[frame, o] = max(0.0, depth)
         self.held_force[frame] = state.diagnostics.held_impulse / self.clock.frame
         self.steps[frame], self.frame_ns[frame] = steps, elapsed_ns

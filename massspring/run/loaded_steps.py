@@ -1,5 +1,5 @@
-"""How many steps a frame takes while a body is under load: pressures raise its largest frequency (docs/theory.md, section
-5)."""
+"""How many steps a frame takes while a body is under load: pressures raise its largest frequency (docs/theory.md,
+section 5)."""
 
 import math
 
@@ -15,8 +15,6 @@ from massspring.run.setup import Setup
 
 FIRST, FURTHER = 40, 3
 """Power iterations at rest, and after each frame from the last vector; loads change little in a frame."""
-NUDGE = 1e-7
-"""Largest displacement of a difference of forces, over the size of the body: forces then differ in nine digits."""
 
 
 class LoadedSteps:
@@ -27,26 +25,26 @@ class LoadedSteps:
     """
 
     def __init__(self, setup: Setup, start: State) -> None:
-        self.clock, self.damping = setup.clock, setup.damping
-        self.watches = setup.clock.limit is not None and isinstance(start.rows, PointRows)
-        if not self.watches:
+        self.clock = setup.clock
+        follows = isinstance(start.rows, PointRows) and setup.method.capabilities.correction == "limited"
+        self.limit = setup.clock.limit if follows and setup.method.capabilities.conditionally_stable else None
+        if self.limit is None:
             return
         body = setup.inside.body
-        springs = body.springs
-        self.springs = csr_array(edge_blocks(springs.ends, springs.stiffness[:, None, None] * np.eye(3), body.node_count))
-        self.nudge = NUDGE * body.size
-        free = start.model.inverse_mass[:, None]
-        self.vector = free * np.random.default_rng(0).standard_normal((body.node_count, 3))
-        self.at_rest = self._iterated(start.moved_to(setup.body.rest), np.zeros_like(start.lam), FIRST)
+        ends, stiffness = body.springs.ends, body.springs.stiffness[:, None, None] * np.eye(3)
+        self.springs = csr_array(edge_blocks(ends, stiffness, body.node_count))
+        self.nudge = math.sqrt(np.finfo(start.nodes.x.dtype).eps) * body.size
+        self.vector = np.random.default_rng(0).standard_normal((body.node_count, 3))
+        at_rest = start.moved_to(setup.body.rest)
+        self.at_rest = self._iterated(at_rest, np.zeros_like(start.lam), FIRST)
 
     def of(self, state: State) -> int:
         """Steps of the next frame, from `state` on."""
-        if not self.watches:
+        if self.limit is None:
             return self.clock.steps
-        limit = self.clock.limit
         rise = math.sqrt(max(self._iterated(state, state.lam, FURTHER) / self.at_rest, 1.0))
-        loaded = StepLimit(rise * limit.frequency, limit.damping).damped
-        share = self.clock.dt / limit.damped
+        loaded = StepLimit(rise * self.limit.frequency, self.limit.damping).damped
+        share = self.clock.dt / self.limit.damped
         return math.ceil(self.clock.frame / (share * loaded) - 1e-9)
 
     def _iterated(self, state: State, lam: np.ndarray, count: int) -> float:

@@ -75,6 +75,15 @@ def graded(scene: Scene) -> tuple[BodyRecipe, ...]:
     return tuple(QuadraticBody(nodes, graded=way, mass=_mass(scene)) for nodes in BUDGETS[1:])
 
 
+def mixed(scene: Scene) -> tuple[BodyRecipe, ...]:
+    """Quadratic bodies whose elements keep a volume of their own where the scene holds them: with elements of one size
+    in two sizes, and adaptive; none where nothing is held."""
+    if not scene.held:
+        return ()
+    ways = [(size, False) for size in BUDGETS[:2]] + [(BUDGETS[1], ADAPTIVE)] * is_adaptive(scene)
+    return tuple(QuadraticBody(size, graded=way, mass=_mass(scene), volumes="mixed") for size, way in ways)
+
+
 def is_adaptive(scene: Scene) -> bool:
     """Whether one solution of the coarse body can say where elements should be small."""
     return bool(scene.held) and load_of(scene) not in NOT_ADAPTIVE
@@ -86,10 +95,10 @@ def can_be_graded(scene: Scene) -> bool:
 
 
 def quadratic_cases(scene: Scene) -> tuple[Case, ...]:
-    """Even and graded bodies in all sizes at the long step, each on five neighbouring meshes. The headline is recorded,
-    and the middle one of each five is timed."""
+    """Even, graded and mixed bodies in all sizes at the long step, each on five neighbouring meshes. The headline is
+    recorded, and the middle one of each five is timed."""
     best, cases = headline_case(scene), list[Case]()
-    for body in (*even(scene), *graded(scene)):
+    for body in (*even(scene), *graded(scene), *mixed(scene)):
         for mesh in neighbours(body):
             case = _timed(scene, mesh, LONG) if mesh == body else replace(_timed(scene, mesh, LONG), timed=False)
             cases.append(best if mesh == best.body else case)

@@ -76,7 +76,9 @@ class RunFields(Table):
     penetration = array("F o", NUMBER, "m", "depth of the deepest surface node, or point in a facet, in each obstacle")
     held_force = array("F g 3", NUMBER, "N", "force of each held region on the body, mean of the frame")
     iterations = array("F 2", INDEX, "1", "for the multipliers: sum of the frame, most in a step")
-    frame_steps = optional_array("F", INDEX, "1", "steps of each frame: more than at rest where a load lowers the limit")
+    frame_steps = optional_array(
+        "F", INDEX, "1", "steps of each frame: more than at rest where a load lowers the limit"
+    )
     min_j = array("F", NUMBER, "1", "least J of an element, of a quadratic one at its points; NaN without")
     snapshot_frame = array("K", INDEX, "1", "number of the frame after which each snapshot was taken")
     snapshots = array("K n 3", NUMBER, "m", "positions at the scene's checkpoints")

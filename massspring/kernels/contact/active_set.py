@@ -131,7 +131,7 @@ def enters(model, nodes, boundary, step, push, i):
     """Whether the free node i would end the step in an obstacle (eq. 3.7)."""
     y = plus(row(nodes.x, i), times(boundary.dt, pushed_velocity(model, nodes, boundary, push, i)))
     place = boundary.position[step]
-    for o in range(boundary.radius.shape[0]):  # noqa: SIM110 — numba compiles no generators
+    for o in range(boundary.radius.shape[0]):
         if not boundary.inside[o] and gap_and_normal(boundary, o, minus(y, row(place, o)))[0] < 0.0:
             return True
     return False

@@ -14,7 +14,8 @@ from massspring.kernels.jit.vec3 import dot, minus, over, plus, row, times
 
 @njit_inlined
 def predicted_gaps_into(model, nodes, contacts, boundary, step, push):
-    """gap_i = min over the obstacles that touch nodes of the distance of y = x + dt (v* + dt W f) [m], f the push (eq. 3.7).
+    """gap_i = min over the obstacles that touch nodes of the distance of y = x + dt (v* + dt W f) [m], f the push (eq.
+    3.7).
 
     Of all nodes, those that nothing can touch among them.
     """

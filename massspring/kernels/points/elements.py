@@ -22,10 +22,9 @@ from massspring.kernels.points.slopes import (
     slopes,
 )
 
-
 BULK_PER_PRESSURE = 2.0 / 3.0
-"""Rise of b with the pressure of a point above that of rest: the least that keeps a point stable under pressure alone, and
-enough in uniaxial and plane compression (docs/theory.md, eq. 8.11b)."""
+"""Rise of b with the pressure of a point above that of rest: the least that keeps a point stable under pressure alone,
+and enough in uniaxial and plane compression (docs/theory.md, eq. 8.12b)."""
 
 
 @njit_inlined
@@ -97,8 +96,8 @@ def add_corners(rows, out):
 
 @njit_lean
 def measure_into(rows, x, padded):
-    """A_i and −b_q (J_q − 1) of all points, V_r [m³], and dV/dx of the closed surface; `padded` (n, 4) holds `x`. b_q is
-    that of the multipliers `rows.lam`."""
+    """A_i and −b_q (J_q − 1) of all points, V_r [m³], and dV/dx of the closed surface; `padded` (n, 4) holds `x`. b_q
+    is that of the multipliers `rows.lam`."""
     name_pressures(rows, rows.lam)
     for block in range(blocks_of(rows)):
         gather_block(rows, padded, block)

@@ -168,8 +168,8 @@ def sweep_until_settled(facets, boundary, step, speed, inverse_mass, count):
 
 @njit_lean
 def corrections_into(nodes, facets, boundary, step, speed, field, inverse_mass):
-    """The changes of the forces at all points, as nodal forces [N], into `field` (n, 3). Returns how many facets are near
-    an obstacle.
+    """The changes of the forces at all points, as nodal forces [N], into `field` (n, 3). Returns how many facets are
+    near an obstacle.
 
     `speed` (n, 4): velocities of the nodes under the forces of the last step [m/s]; each correction updates it for the
     following facets.
@@ -195,8 +195,8 @@ def changes_into(facets, field, count):
 
 @njit_lean
 def book_points(facets, boundary, step, speed, contact_impulse, count):
-    """Adds the impulses on the points of the first `count` facets in `near` to their obstacles, and moves the anchors of
-    points that slide; `speed` (n, 4): velocities at the end of the step [m/s]."""
+    """Adds the impulses on the points of the first `count` facets in `near` to their obstacles, and moves the anchors
+    of points that slide; `speed` (n, 4): velocities at the end of the step [m/s]."""
     for k in range(count):
         f = facets.near[k]
         for q in range(facets.shape.shape[0]):

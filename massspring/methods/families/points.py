@@ -80,8 +80,8 @@ def any_touches(boundary, inside):
 
 @njit_inlined
 def meet_points(frame, step, push, rows, implicit):
-    """Contact at nodes with the push of the last step (eq. 3.7), and inside facets with the forces of the last step (eq.
-    9.3–9.5). Returns the most passes of the active set, and how many facets are near an obstacle."""
+    """Contact at nodes with the push of the last step (eq. 3.7), and inside facets with the forces of the last step
+    (eq. 9.3–9.5). Returns the most passes of the active set, and how many facets are near an obstacle."""
     boundary, inside = frame.boundary, any_touches(frame.boundary, True)
     if inside:
         last_forces_into(frame.nodes, rows.facets, boundary, step, rows.field)

@@ -169,7 +169,7 @@ def _per_frame(setup: Setup) -> dict[str, float]:
     state = setup.method.advance(setup.start(), setup.boundary(0))
     times = np.zeros((3, clock.frames))
     for frame in range(clock.frames):
-        records = [partial(recorder.record, frame, state, 0) for recorder in (bare, full)]
+        records = [partial(recorder.record, frame, state, clock.steps, 0) for recorder in (bare, full)]
         for row, work in enumerate([partial(setup.boundary, frame), *records]):
             begin = perf_counter_ns()
             work()

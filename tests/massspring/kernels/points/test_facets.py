@@ -28,8 +28,8 @@ DEPTH = 0.15 * RADIUS
 PRESSED, HELD = 0.25, 0.75
 """Seconds of pressing, and to the end."""
 INSIDE, MOVING = 1e-4, 6e-3
-"""Of the radius that nodes or points may be inside: half a second after the press, and while a plane moves by 0.6 radii a
-second, as pressures follow a growing load one step late."""
+"""Of the radius that nodes or points may be inside: half a second after the press, and while a plane moves by 0.6 radii
+a second, as pressures follow a growing load one step late."""
 BULGES = 0.012
 """Of the radius that a curved facet bulges into a plane between nodes that touch it."""
 EDGE = 0.04
