@@ -22,7 +22,9 @@ class Clock:
     steps: int
     """Steps per frame."""
     limit: StepLimit | None = None
-    """That of the body at rest: as the load lowers it, steps keep their share of it. None: they stay equal."""
+    """That of the body at rest: as a load lowers it, steps get shorter. None: they stay equal."""
+    longest: float = math.inf
+    """Longest step that was asked for [s], of which `dt` is the next that divides a frame."""
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.frame) and self.frame > 0):
@@ -62,7 +64,7 @@ def make_clock(duration: float, frames: int, dt: float | str, limit: StepLimit, 
         )
     frame = duration / frames
     steps = max(1, math.ceil(frame / longest - 1e-9))
-    clock = Clock(frame, frames, steps, None if beyond_limit else limit)
+    clock = Clock(frame, frames, steps, None if beyond_limit else limit, longest)
     if clock.dt > limit.damped and not beyond_limit:
         raise MassSpringError(
             f"dt = {clock.dt:.3g} s lies above the stability limit of {limit.damped:.3g} s; "
