@@ -50,16 +50,22 @@ def start(
         rows = point_rows(body, kept, model.inverse_mass)
     else:
         rows = None if keeps_one(kept) else volume_rows(kept, n)
-    return State(model, nodes, _no_contacts(n), work, np.zeros(kept.count), rows, memory=memory)
+    return State(model, nodes, _no_contacts(body), work, np.zeros(kept.count), rows, memory=memory)
 
 
-def _no_contacts(n: int) -> Contacts:
+def _no_contacts(body: Body) -> Contacts:
+    n, facets = body.node_count, body.contact_facets.astype(np.int64)
+    sides = [facets[:, pair] for pair in ([0, 3], [1, 3], [1, 4], [2, 4], [2, 5], [0, 5])]
+    beside = np.unique(np.concatenate(sides), axis=0)
     return Contacts(
         **{name: np.zeros(n, dtype=np.uint32) for name in ("contact_id", "second", "active", "entering")},
         mode=np.zeros(n, dtype=np.uint8),
         **{name: np.zeros((n, 3)) for name in ("normal", "second_normal", "direction", "v_target")},
         active_count=np.zeros(1, dtype=np.int64),
         predicted_gap=np.zeros(n),
+        beside_start=np.searchsorted(beside[:, 0], np.arange(n + 1)).astype(np.uint32),
+        beside=beside[:, 1].astype(np.uint32),
+        stayed=np.zeros((n, 3), dtype=np.uint32),
     )
 
 

@@ -2,6 +2,7 @@
 
 from itertools import product
 
+import gmsh
 import numpy as np
 from scipy.optimize import brentq
 
@@ -27,6 +28,40 @@ def quadratic_block(cells=(2, 2, 2), edge: float = 0.02, distortion: float = 0.1
     """A straight block with moved nodes."""
     points, _, tetrahedra = block(cells, edge, distortion)
     return second_order(points, tetrahedra)
+
+
+def bricks(cells: tuple[int, int, int], size: tuple[float, float, float]) -> tuple[np.ndarray, np.ndarray]:
+    """A block of `size` [m] from the origin on, six straight elements in each brick."""
+    points, _, tetrahedra = block(cells, 1.0, 0.0)
+    return second_order(points * np.divide(size, cells), tetrahedra)
+
+
+def round_bricks(cells: int, radius: float, height: float) -> tuple[np.ndarray, np.ndarray]:
+    """A cylinder of `radius` and `height` [m] round the z-axis: the squares of a block of `cells`³ bricks moved onto
+    circles."""
+    points, nodes = bricks((cells, cells, cells), (2.0, 2.0, height))
+    across = points[: int(nodes[:, :4].max()) + 1] - [1.0, 1.0, 0.0]
+    square, circle = np.abs(across[:, :2]).max(axis=1), np.hypot(*across[:, :2].T)
+    across[:, :2] *= (radius * square / np.where(circle > 0.0, circle, 1.0))[:, None]
+    return second_order(across, nodes[:, :4])
+
+
+def gmsh_block(edge: float, size: tuple[float, float, float]) -> tuple[np.ndarray, np.ndarray]:
+    """The block of `bricks` in irregular elements of about `edge` [m]."""
+    gmsh.initialize(interruptible=False)
+    try:
+        gmsh.option.setNumber("General.Terminal", 0)
+        gmsh.option.setNumber("Mesh.MeshSizeMin", edge)
+        gmsh.option.setNumber("Mesh.MeshSizeMax", edge)
+        gmsh.model.occ.addBox(0.0, 0.0, 0.0, *size)
+        gmsh.model.occ.synchronize()
+        gmsh.model.mesh.generate(3)
+        tags, points, _ = gmsh.model.mesh.getNodes()
+        tetrahedra = np.searchsorted(np.sort(tags), gmsh.model.mesh.getElementsByType(4)[1]).reshape(-1, 4)
+    finally:
+        gmsh.finalize()
+    points = np.reshape(points, (-1, 3))[np.argsort(tags)]
+    return second_order(points, upright(points, tetrahedra))
 
 
 def curved_block(cells=(2, 2, 2), edge: float = 0.02) -> tuple[np.ndarray, np.ndarray]:

@@ -148,6 +148,12 @@ class Contacts(NamedTuple):
     """Scratch: nodes that would enter an obstacle, (n,) uint32."""
     predicted_gap: np.ndarray
     """Distance to the nearest obstacle at the end of the predicted step [m], inf for touched nodes, (n,)."""
+    beside_start: np.ndarray
+    """Where the mid-side nodes next to each corner of `contact_facets` begin in `beside`, (n + 1,) uint32."""
+    beside: np.ndarray
+    """Mid-side nodes, those of a corner together, uint32."""
+    stayed: np.ndarray
+    """Scratch: corners that lay on planes in the last step, 1 + that plane, 1 + a second one or 0, (n, 3) uint32."""
 
 
 @by_address

@@ -5,12 +5,19 @@ The rare cases (friction, a node on two obstacles) have separate loops in `kerne
 
 import math
 
-from massspring.kernels.contact.friction import activate_edges, apply_friction, release_edges, release_slipping
+from massspring.kernels.contact.friction import (
+    activate_edges,
+    apply_friction,
+    is_held_down,
+    onto_edge,
+    release_edges,
+    release_slipping,
+)
 from massspring.kernels.contact.gaps import gap_and_normal, predicted_gaps_into, pushed_velocity
 from massspring.kernels.contact.node_contact import FREE, ON_EDGE, SLIDES, round_contact
 from massspring.kernels.jit.decorators import njit_exposed, njit_inlined, njit_lean
 from massspring.kernels.jit.flat import BLOCK, any_gap_within
-from massspring.kernels.jit.vec3 import dot, minus, plus, put, row, times
+from massspring.kernels.jit.vec3 import cross, dot, minus, plus, put, row, times
 
 CONTACT_PASSES = 3
 """Active-set passes a step: one when nothing changes; lam is always solved for the set that is applied."""
@@ -84,14 +91,58 @@ def forget_released(contacts):
 def find_contacts(model, nodes, contacts, boundary, step, push):
     """Finds the touched nodes of the step, with the push f of the last step acting on them: u = v* + dt W f (eq.
     3.7)."""
+    corners = note_corners(contacts, boundary)
     release_all(contacts)
     predicted_gaps_into(model, nodes, contacts, boundary, step, push)
-    enter(model, nodes, contacts, boundary, step, push)
+    enter(model, nodes, contacts, boundary, step, push, corners)
 
 
 @njit_inlined
-def enter(model, nodes, contacts, boundary, step, push):
-    """Activates the nodes whose predicted gap is negative (eq. 3.7)."""
+def note_corners(contacts, boundary):
+    """Notes the corners of facets that lie on planes; returns how many."""
+    count, start = 0, contacts.beside_start
+    for k in range(contacts.active_count[0]):
+        i = contacts.active[k]
+        if contacts.mode[i] == FREE or start[i + 1] == start[i]:
+            continue
+        o, second = contacts.contact_id[i], contacts.second[i] if contacts.mode[i] == ON_EDGE else 0
+        if boundary.is_plane[o - 1] and (second == 0 or boundary.is_plane[second - 1]):
+            contacts.stayed[count, 0], contacts.stayed[count, 1], contacts.stayed[count, 2] = i, o, second
+            count += 1
+    return count
+
+
+@njit_inlined
+def keep_corners(model, nodes, contacts, boundary, step, push, count):
+    """Puts the first `count` corners in `stayed` back on their planes: nothing need press them (eq. 3.8b)."""
+    place, dt, listed = boundary.position[step], boundary.dt, contacts.active_count[0]
+    for k in range(count):
+        i, o, second = contacts.stayed[k, 0], contacts.stayed[k, 1], contacts.stayed[k, 2]
+        if contacts.mode[i] == FREE:
+            contacts.predicted_gap[i] = math.inf
+            contacts.active[listed] = i
+            listed += 1
+        elif second == 0:
+            continue
+        u = pushed_velocity(model, nodes, boundary, push, i)
+        y = plus(row(nodes.x, i), times(dt, u))
+        gap, n = gap_and_normal(boundary, o - 1, minus(y, row(place, o - 1)))
+        a = dot(n, u) - gap / dt
+        contacts.contact_id[i], contacts.mode[i] = o, SLIDES
+        put(contacts.normal, i, n)
+        put(contacts.direction, i, n)
+        put(contacts.v_target, i, times(a, n))
+        if second > 0:
+            gap, m = gap_and_normal(boundary, second - 1, minus(y, row(place, second - 1)))
+            contacts.second[i], contacts.mode[i] = second, ON_EDGE
+            put(contacts.second_normal, i, m)
+            onto_edge(contacts, i, a, dot(m, u) - gap / dt, cross(n, m))
+    contacts.active_count[0] = listed
+
+
+@njit_inlined
+def enter(model, nodes, contacts, boundary, step, push, corners):
+    """Activates the nodes whose predicted gap is negative (eq. 3.7), and the first `corners` in `stayed`."""
     touchable, predicted_gap, entering = model.touchable, contacts.predicted_gap, contacts.entering
     count = 0
     for begin in range(0, predicted_gap.shape[0], BLOCK):
@@ -104,6 +155,8 @@ def enter(model, nodes, contacts, boundary, step, push):
     if count > 0:
         activate(model, nodes, contacts, boundary, step, push, count)
         register(contacts, count)
+    if corners > 0:
+        keep_corners(model, nodes, contacts, boundary, step, push, corners)
     if boundary.rough:
         apply_friction(model, nodes, contacts, boundary, step, push)
     if boundary.radius.shape[0] > 1:
@@ -119,7 +172,8 @@ def release_pulled(model, nodes, contacts, boundary, push):
         if contacts.mode[i] == FREE or contacts.mode[i] == ON_EDGE:
             continue
         n, u = row(contacts.normal, i), pushed_velocity(model, nodes, boundary, push, i)
-        if dot(row(contacts.v_target, i), n) < dot(u, n):
+        pulled = dot(row(contacts.v_target, i), n) < dot(u, n)
+        if pulled and not is_held_down(model, nodes, contacts, boundary, push, i, contacts.contact_id[i]):
             # The next pass checks a released node again, however the pressure changes.
             contacts.contact_id[i], contacts.mode[i], contacts.predicted_gap[i] = 0, FREE, 0.0
             changes += 1

@@ -10,6 +10,9 @@ from massspring.kernels.jit.vec3 import add_to, cross, dot, minus, over, plus, p
 
 SLIPS = 1.0 + 1e-9
 """Factor on the friction limit, so that round-off does not make a sticking node slip."""
+LIFTS = 1.0 / 12.0
+"""Part of the push on the mid-side nodes next to a corner, with which a plane may pull the corner: there the pressure,
+linear over the facets, is zero. Under an even pressure the force on a corner is zero, and its sign is chance."""
 PARALLEL = 1e-4
 """Squared sine between two normals (0.6°) below which they count as one: there is no edge to slide along."""
 
@@ -26,7 +29,7 @@ def apply_friction(model, nodes, contacts, boundary, step, push):
         pressed = boundary.friction[o] * dot(minus(g, u), n)
         s = allowed_part(SLIDES, n, minus(u, w))
         slip = math.sqrt(dot(s, s))
-        if slip <= pressed:
+        if boundary.friction[o] == math.inf or slip <= pressed:
             contacts.mode[i] = STICKS
             put(contacts.v_target, i, plus(g, allowed_part(SLIDES, n, w)))
         else:
@@ -102,6 +105,31 @@ def impulse_shares(k, n, m):
     return (along - cosine * other) / square, (other - cosine * along) / square
 
 
+@njit_inlined
+def push_of(model, nodes, contacts, boundary, push, i, o):
+    """The impulse on a node that touches obstacle `o` − 1, along its normal [N s]."""
+    missing = minus(row(contacts.v_target, i), pushed_velocity(model, nodes, boundary, push, i))
+    along = dot(missing, row(contacts.normal, i))
+    if contacts.mode[i] == ON_EDGE:
+        along, other = impulse_shares(missing, row(contacts.normal, i), row(contacts.second_normal, i))
+        if contacts.contact_id[i] != o:
+            along = other
+    return model.mass[i] * along
+
+
+@njit_inlined
+def is_held_down(model, nodes, contacts, boundary, push, i, o):
+    """Whether a corner that obstacle `o` − 1 pulls stays: f_c ≥ −Σ f_m / 12 over the mid-side nodes m next to it (eq.
+    3.8b)."""
+    pressed = 0.0
+    for k in range(contacts.beside_start[i], contacts.beside_start[i + 1]):
+        j = contacts.beside[k]
+        touches = contacts.mode[j] > FREE and contacts.contact_id[j] == o
+        if touches or (contacts.mode[j] == ON_EDGE and contacts.second[j] == o):
+            pressed += max(0.0, push_of(model, nodes, contacts, boundary, push, j, o))
+    return pressed > 0.0 and push_of(model, nodes, contacts, boundary, push, i, o) >= -LIFTS * pressed
+
+
 @njit_lean
 def release_edges(model, nodes, contacts, boundary, push):
     """Releases nodes on an edge that one of the two obstacles would pull; the next search finds the other obstacle (eq.
@@ -115,7 +143,10 @@ def release_edges(model, nodes, contacts, boundary, push):
         # The free direction along the edge is orthogonal to both normals and does not contribute.
         missing = minus(row(contacts.v_target, i), u)
         alpha, beta = impulse_shares(missing, row(contacts.normal, i), row(contacts.second_normal, i))
-        if alpha < 0.0 or beta < 0.0:
+        first, second = contacts.contact_id[i], contacts.second[i]
+        if (alpha < 0.0 and not is_held_down(model, nodes, contacts, boundary, push, i, first)) or (
+            beta < 0.0 and not is_held_down(model, nodes, contacts, boundary, push, i, second)
+        ):
             contacts.contact_id[i], contacts.mode[i], contacts.predicted_gap[i] = 0, FREE, 0.0
             changes += 1
     return changes
