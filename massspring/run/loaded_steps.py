@@ -16,6 +16,8 @@ from massspring.run.setup import Setup
 FIRST, FURTHER = 200, 3
 """Power iterations at rest, where they find the largest frequency to 1 %, and after each frame from the last vector:
 loads change little in a frame."""
+SHARE = 0.8
+"""Of the loaded limit that a step may take; more where the step that was asked for is more of the limit at rest."""
 
 
 class LoadedSteps:
@@ -45,7 +47,8 @@ class LoadedSteps:
             return self.clock.steps
         rise = math.sqrt(max(self._iterated(state, state.lam, FURTHER) / self.at_rest, 1.0))
         loaded = StepLimit(rise * self.limit.frequency, self.limit.damping).damped
-        longest = self.clock.longest * loaded / self.limit.damped
+        share = max(SHARE, self.clock.longest / self.limit.damped)
+        longest = min(self.clock.longest, share * loaded)
         return max(self.clock.steps, math.ceil(self.clock.frame / longest - 1e-9))
 
     def _iterated(self, state: State, lam: np.ndarray, count: int) -> float:

@@ -22,7 +22,7 @@ class Clock:
     steps: int
     """Steps per frame."""
     limit: StepLimit | None = None
-    """That of the body at rest: as a load lowers it, steps get shorter. None: they stay equal."""
+    """That of the body at rest: where a load lowers it too far, steps get shorter. None: they stay equal."""
     longest: float = math.inf
     """Longest step that was asked for [s], of which `dt` is the next that divides a frame."""
 

@@ -39,7 +39,7 @@ def test_steps_follow_the_largest_frequency_of_the_loaded_body(height):
         taken = steps.of(state)
     wanted = FRAME / (SHARE * replace(LIMIT, frequency=frequency).damped)
     assert taken == pytest.approx(wanted, rel=0.02, abs=1.0)
-    assert height == 1.0 or wanted > 1.1 * SETUP.clock.steps  # the load matters
+    assert height > 0.5 or taken > SETUP.clock.steps  # the load matters
 
 
 def test_a_clock_without_a_limit_keeps_its_steps():
