@@ -28,6 +28,7 @@ def point_rows(body: Body, volumes: PointVolumes, inverse_mass: np.ndarray) -> P
         other=float(FAR),
         bulk=body.local_bulk,
         rest_pressure=body.rest_pressure,
+        eased=body.rest_lam.copy(),
         corner_volume=_in_blocks(volumes.corner_volume.astype(np.uint32)),
         node_start=node_start,
         node_entry=node_entry,

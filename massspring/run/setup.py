@@ -215,11 +215,11 @@ class Setup:
 def touches_inside(obstacle: Obstacle, body: Body, method: Method) -> bool:
     """Whether an obstacle touches a body at points inside its facets, not at its nodes.
 
-    All of a facet lies on a plane when its nodes do, and contact at nodes is solved together with the volumes. Points
-    follow Coulomb's law more closely, and a method that moves all nodes at once meets every obstacle at points.
+    All of a facet lies on a plane when its nodes do, and contact at nodes is solved together with the volumes. A method
+    that moves all nodes at once meets every obstacle at points.
     """
-    flat = isinstance(obstacle, Plane) and obstacle.friction in (0.0, "no_slip")
-    return bool(len(body.contact_facets)) and not (flat and method.capabilities.keeps != "points")
+    flat = isinstance(obstacle, Plane) and method.capabilities.keeps != "points"
+    return bool(len(body.contact_facets)) and not flat
 
 
 def _rows(vectors: list[np.ndarray]) -> np.ndarray:

@@ -149,6 +149,8 @@ class PointRows(NamedTuple):
     """V_r [m³], (m,)."""
     lam: np.ndarray
     """Multipliers [Pa], (m,); on entry those of the last step."""
+    eased: np.ndarray
+    """The multipliers, followed slowly [Pa], (m,)."""
     push: np.ndarray
     """The force on each node from all volumes and from the local pressure −b_q (J_q − 1) at the points [N], (n, 3)."""
     right: np.ndarray

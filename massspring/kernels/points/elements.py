@@ -25,6 +25,12 @@ from massspring.kernels.points.slopes import (
 BULK_PER_PRESSURE = 2.0 / 3.0
 """Rise of b with the pressure of a point above that of rest: the least that keeps a point stable under pressure alone,
 and enough in uniaxial and plane compression (docs/theory.md, eq. 8.12b)."""
+MOST_BULK = 7.0 / 3.0
+"""Largest b over the pressure at rest: that of four times this pressure, of plane strain by half. At the edge of a held
+region pressures have no bound."""
+EASE = 0.02
+"""Part of a change of pressure that b follows in a step. Where J is far from 1 b changes the pressure that it follows:
+five of six squeezed kidneys diverged where it followed at once."""
 
 
 @njit_inlined
@@ -49,6 +55,15 @@ def pressures_at(rows, block, lane):
 
 
 @njit_inlined
+def bulk_at(rows, pressure):
+    """b_q [Pa] at a point with that pressure [Pa], between that at rest and MOST_BULK (eq. 8.12b)."""
+    risen = spread(BULK_PER_PRESSURE, rows.tile) * (pressure - spread(rows.rest_pressure, rows.tile))
+    room = at_least(spread(MOST_BULK * rows.rest_pressure - rows.bulk, rows.tile), spread(0, rows.tile))
+    left = at_least(room - at_least(risen, spread(0, rows.tile)), spread(0, rows.tile))
+    return spread(rows.bulk, rows.tile) + room - left
+
+
+@njit_inlined
 def open_point(rows, block, q, pressure, between, lane):
     """A_i = W_j × W_k / 24 = w_q cof F_q ∇b_i of the positions in the tile into `area`, −b_q (J_q − 1) into `stretch`,
     w_q J_q into the tile; b_q from the pressure of the point [Pa]."""
@@ -58,9 +73,7 @@ def open_point(rows, block, q, pressure, between, lane):
     now = dot(w1, a1)
     stretch, tile = flat(rows.stretch, point, point + 1), flat(rows.tile, SUMS + q, SUMS + q + 1)
     ratio = now * load(rows.per_weight, point, lane)
-    above = at_least(pressure - spread(rows.rest_pressure, rows.tile), spread(0, rows.tile))
-    bulk = spread(rows.bulk, rows.tile) + spread(BULK_PER_PRESSURE, rows.tile) * above
-    save(bulk * (spread(1, rows.tile) - ratio), stretch, lane)
+    save(bulk_at(rows, pressure) * (spread(1, rows.tile) - ratio), stretch, lane)
     save(now, tile, lane)
     area = flat(rows.area, AREAS * point, AREAS * (point + 1))
     save_three(a1, area, lane)
@@ -95,10 +108,17 @@ def add_corners(rows, out):
 
 
 @njit_lean
+def ease_into(rows):
+    """`eased` a step closer to the multipliers."""
+    for r in range(rows.eased.shape[0]):
+        rows.eased[r] += EASE * (rows.lam[r] - rows.eased[r])
+
+
+@njit_lean
 def measure_into(rows, x, padded):
     """A_i and −b_q (J_q − 1) of all points, V_r [m³], and dV/dx of the closed surface; `padded` (n, 4) holds `x`. b_q
-    is that of the multipliers `rows.lam`."""
-    name_pressures(rows, rows.lam)
+    is that of the pressures `rows.eased`."""
+    name_pressures(rows, rows.eased)
     for block in range(blocks_of(rows)):
         gather_block(rows, padded, block)
         for lane in range(0, BLOCK, lanes_of(padded)):

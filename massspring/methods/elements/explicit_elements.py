@@ -180,7 +180,7 @@ class ExplicitElements(Method):
         memory = Corotated(body, elements_of(body, bulk)) if self.law == "corotated" else bulk
         state = start(body, attachments, v, memory=memory)
         if isinstance(state.rows, PointRows):  # a compressible solid's law has a constant b
-            state = replace(state, rows=state.rows._replace(rest_pressure=np.inf))
+            state = replace(state, rows=state.rows._replace(rest_pressure=0.0))
         return state
 
     def advance(self, state: State, boundary: BoundaryConditions) -> State:

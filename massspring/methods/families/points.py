@@ -11,7 +11,7 @@ from massspring.kernels.contact.face_pairs import press_pairs
 from massspring.kernels.jit.by_address import by_address
 from massspring.kernels.jit.decorators import njit_inlined, njit_lean
 from massspring.kernels.jit.stage_clock import HELD, INTEGRATION, SEARCH, SPRINGS, VOLUME, end_stage
-from massspring.kernels.points.elements import measure_into, push_into
+from massspring.kernels.points.elements import ease_into, measure_into, push_into
 from massspring.kernels.points.facet_forces import book_points, corrections_into
 from massspring.kernels.points.facets import last_forces_into
 from massspring.kernels.points.solve import (
@@ -144,6 +144,7 @@ def point_volumes_frame(frame, rows, implicit, accuracy, pairs):
         weigh_into(model, nodes, rows, boundary)
         if implicit is not None:
             take_springs_implicitly(frame, rows, implicit)
+        ease_into(rows)
         measure_into(rows, nodes.x, frame.work.padded_positions)
         push_into(rows, rows.lam)
         end_stage(diagnostics.stage_times, VOLUME)
