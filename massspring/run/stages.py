@@ -8,6 +8,7 @@ from massspring.body.bisection import Growth
 from massspring.body.body import Body
 from massspring.body.springs import lengths
 from massspring.kernels.arrays.layout import BoundaryConditions
+from massspring.kernels.points.arrays import PointRows
 from massspring.layout.sell_chunks import aligned, slices_of
 from massspring.layout.state import State
 from massspring.run.events import Easing, LettingIn, kept_momentum
@@ -58,6 +59,8 @@ class Stage:
         place = slice(None) if self.start.permutation is None else self.start.permutation
         nodes.x[place], nodes.v[place] = x, v
         start = replace(self.start, nodes=nodes, lam=state.lam[self.before.volumes])
+        if isinstance(start.rows, PointRows) and isinstance(state.rows, PointRows):
+            start.rows.eased[:] = state.rows.eased[self.before.volumes]
         if start.pairs is not None and state.pairs is not None:
             start = replace(start, pairs=start.pairs._replace(lost=state.pairs.lost.copy()))
         off = body.kept.measure(x) - self.targets_after(self.frame - 1)

@@ -22,6 +22,7 @@ def squeezed(height: float):
     """The state of uniaxial compression to `height` over the height at rest, with its pressure p = mu/height."""
     start = SETUP.start()
     x = BODY.rest * np.array([height**-0.5, height**-0.5, height])
+    start.rows.eased[:] = BODY.rest_pressure / height
     return replace(start.moved_to(x), lam=np.full_like(start.lam, BODY.rest_pressure * (1.0 / height - 1.0))), x
 
 
