@@ -9,11 +9,15 @@ from scipy.sparse import csr_array
 
 from massspring.body.body import Body
 from massspring.kernels.arrays.layout import BoundaryConditions
+from massspring.kernels.points.arrays import PointRows
 from massspring.layout.allocate import start
 from massspring.layout.probe_arrays import fresh
 from massspring.layout.state import State, new_diagnostics
 from massspring.methods.capabilities import Capabilities
 from massspring.world.obstacles import Attachment, Surroundings
+
+REMEMBERED = ("contact_id", "pressing", "normal", "dragging", "anchor")
+"""What contact inside facets keeps from step to step."""
 
 
 class Method(Protocol):
@@ -59,4 +63,8 @@ def begin_frame(state: State, boundary: BoundaryConditions) -> State:
     obstacles = len(boundary.radius) + boundary.tips.end.shape[1]
     diagnostics = new_diagnostics(obstacles, boundary.held_displacement.shape[1], state.diagnostics.stage_times)
     probing = None if state.probing is None else fresh(state.probing, diagnostics)
-    return replace(state, nodes=nodes, diagnostics=diagnostics, probing=probing)
+    rows = state.rows
+    if isinstance(rows, PointRows):
+        touched = {name: getattr(rows.facets, name).copy() for name in REMEMBERED}
+        rows = rows._replace(eased=rows.eased.copy(), facets=rows.facets._replace(**touched))
+    return replace(state, nodes=nodes, rows=rows, diagnostics=diagnostics, probing=probing)

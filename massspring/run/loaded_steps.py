@@ -8,14 +8,24 @@ from scipy.sparse import csr_array
 
 from massspring.analysis.stability import StepLimit
 from massspring.analysis.stiffness import edge_blocks
+from massspring.kernels.arrays.layout import BoundaryConditions
 from massspring.kernels.points.arrays import PointRows
 from massspring.kernels.points.elements import measure_into, push_into
 from massspring.layout.state import State
 from massspring.run.setup import Setup
+from massspring.run.stages import Stage
 
 FIRST, FURTHER = 200, 3
 """Power iterations at rest, where they find the largest frequency to 1 %, and after each frame from the last vector:
 loads change little in a frame."""
+NOISE = 0.1
+"""Of the last vector, added before each frame: a mode that a load makes the fastest is then found in a few frames."""
+LATE, AGAIN = 1.25, 3
+"""A frame after which this many times its steps are needed is run again with twice as many, so many times at most."""
+FEWER = 0.95
+"""Least steps of a frame over those of the frame before: the estimate is late after a sudden load."""
+HOPELESS = 400.0
+"""Rise of ω² from which a state counts as burst: no load needs steps so short."""
 SHARE = 0.8
 """Of the loaded limit that a step may take; more where the step that was asked for is more of the limit at rest."""
 
@@ -28,7 +38,7 @@ class LoadedSteps:
     """
 
     def __init__(self, setup: Setup, start: State) -> None:
-        self.clock = setup.clock
+        self.clock, self.steps = setup.clock, setup.clock.steps
         follows = isinstance(start.rows, PointRows) and setup.method.capabilities.correction == "limited"
         self.limit = setup.clock.limit if follows and setup.method.capabilities.conditionally_stable else None
         if self.limit is None:
@@ -38,14 +48,36 @@ class LoadedSteps:
         self.springs = csr_array(edge_blocks(ends, stiffness, body.node_count))
         self.nudge = math.sqrt(np.finfo(start.nodes.x.dtype).eps) * body.size
         self.vector = np.random.default_rng(0).standard_normal((body.node_count, 3))
+        self.noise = NOISE / np.abs(self.vector).max() * self.vector
         at_rest = start.moved_to(setup.body.rest)
         self.at_rest = self._iterated(at_rest, np.zeros_like(start.lam), FIRST)
+        self.steps = self.needed(start)
 
-    def of(self, state: State) -> int:
-        """Steps of the next frame, from `state` on."""
+    def advanced(self, stage: Stage, state: State, frame: int, boundary: BoundaryConditions) -> tuple[State, int]:
+        """The state after frame number `frame` with that boundary, and the steps that it took: twice as many, up to
+        AGAIN times, where they were too long for the load at its end. Faces of a cut keep what they did, so a frame
+        with them runs once."""
+        steps, again = self.steps, AGAIN if state.pairs is None else 0
+        if self.limit is None:
+            return stage.setup.method.advance(state, boundary), steps
+        while True:
+            vector, after = self.vector, stage.setup.method.advance(state, boundary)
+            needed = self.needed(after)
+            if needed <= LATE * steps or again == 0:
+                self.steps = max(min(needed, 2 * steps), math.ceil(FEWER * steps))
+                return after, steps
+            self.vector, steps, again = vector, 2 * steps, again - 1
+            boundary = stage.boundary(frame, steps)
+
+    def needed(self, state: State) -> int:
+        """Steps of a frame that begins at `state`."""
         if self.limit is None:
             return self.clock.steps
-        rise = math.sqrt(max(self._iterated(state, state.lam, FURTHER) / self.at_rest, 1.0))
+        self.vector = self.vector + self.noise
+        square = self._iterated(state, state.lam, FURTHER) if np.isfinite(state.nodes.v).all() else math.inf
+        if not square < HOPELESS * self.at_rest:
+            return math.ceil(math.sqrt(HOPELESS)) * self.clock.steps
+        rise = math.sqrt(max(square / self.at_rest, 1.0))
         loaded = StepLimit(rise * self.limit.frequency, self.limit.damping).damped
         share = max(SHARE, self.clock.longest / self.limit.damped)
         longest = min(self.clock.longest, share * loaded)

@@ -40,14 +40,14 @@ def simulate(
 
     `snapshots`: numbers (1 … F) of the frames after which positions are kept. `on_frame(number)` is called after each.
     A run that takes more than `time_limit` [s] of this thread's processor time ends early. `extra`: which of
-    `history.EXTRA` are recorded; raises MassSpringError for another name. Frame times are those of `advance` alone.
+    `history.EXTRA` are recorded; raises MassSpringError for another name. Frame times are those of the
+    steps and of finding how many they are.
     """
     keep = frozenset(snapshots)
     now, *later = stages = stages_of(setup)
     recorder = Recorder(stages[-1].setup.body, setup.clock, setup.obstacles, len(setup.attachments), keep, extra)
     recorder.volume_target[:] = stages[-1].setup.volume_targets(recorder.t)
     state = now.start
-    advance = setup.method.advance
     begun = thread_time_ns()
     loaded = LoadedSteps(now.setup, state)
     for frame in range(setup.clock.frames):
@@ -58,13 +58,12 @@ def simulate(
             loaded = LoadedSteps(now.setup, state)
             recorder.passages.append(passage(before, was, state, now.setup.body, perf_counter_ns() - begin))
         state = now.let_in(state, frame)
-        steps = loaded.of(state)
-        boundary = now.boundary(frame, steps)
+        boundary = now.boundary(frame, loaded.steps)
         reason = check_loads(boundary)
         if reason is not None:
             return recorder.stopped(frame, "diverged", reason)
         begin = perf_counter_ns()
-        state = advance(state, boundary)
+        state, steps = loaded.advanced(now, state, frame, boundary)
         elapsed = perf_counter_ns() - begin
         reason = check_state(state, now.setup.body)
         if reason is not None:

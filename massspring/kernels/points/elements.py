@@ -25,9 +25,9 @@ from massspring.kernels.points.slopes import (
 BULK_PER_PRESSURE = 2.0 / 3.0
 """Rise of b with the pressure of a point above that of rest: the least that keeps a point stable under pressure alone,
 and enough in uniaxial and plane compression (docs/theory.md, eq. 8.12b)."""
-MOST_BULK = 7.0 / 3.0
-"""Largest b over the pressure at rest: that of four times this pressure, of plane strain by half. At the edge of a held
-region pressures have no bound."""
+MOST_BULK = 1.0
+"""Largest b over the pressure at rest: enough in uniaxial compression by half, and in plane strain by 38 %. At the edge
+of a held region pressures have no bound, and a step must bear b."""
 EASE = 0.02
 """Part of a change of pressure that b follows in a step. Where J is far from 1 b changes the pressure that it follows:
 five of six squeezed kidneys diverged where it followed at once."""

@@ -61,7 +61,7 @@ def run_frames(setup: Setup, state: State, times: StageTimes = UNTIMED, frames: 
     price = end_stage_ns() if times.on[0] else 0.0
     loaded = LoadedSteps(setup, state)
     for frame in range(frames):
-        boundary = setup.boundary(frame, steps=loaded.of(state))
+        boundary = setup.boundary(frame, steps=loaded.needed(state))
         if times.on[0]:
             times.spent[:], times.ended[:] = 0, 0
         begin = perf_counter_ns()

@@ -10,6 +10,7 @@ from studies.plots.style.style import (
     BLUE,
     GREEN,
     GREY,
+    LITERATURE_COLOURS,
     MUTED,
     ORANGE,
     PURPLE,
@@ -46,8 +47,8 @@ FAMILIES: dict[tuple[str, bool | str, str], Family] = {
     ("quadratic", False, "vertex"): Family("quadratic, uniform", SKY, "P"),
     ("quadratic", True, "vertex"): Family("quadratic, graded", BLUE, "*"),
     ("quadratic", ADAPTIVE, "vertex"): Family("quadratic, adaptive", GREEN, (5, 1, 36)),
-    ("quadratic", False, "mixed"): Family("quadratic, uniform, mixed", MUTED[3], (6, 1, 0)),
-    ("quadratic", ADAPTIVE, "mixed"): Family("quadratic, adaptive, mixed", MUTED[6], (8, 1, 0)),
+    ("quadratic", False, "mixed"): Family("quadratic, uniform, mixed", LITERATURE_COLOURS[2], (6, 1, 0)),
+    ("quadratic", ADAPTIVE, "mixed"): Family("quadratic, adaptive, mixed", LITERATURE_COLOURS[1], (8, 1, 0)),
     ("tetrahedral", True, "scene"): Family("tetrahedra, graded", MUTED[4], "v"),
 }
 """(kind of body, whether it is graded, its volumes) -> family; no two markers are alike."""

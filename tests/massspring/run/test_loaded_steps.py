@@ -37,7 +37,7 @@ def test_steps_follow_the_largest_frequency_of_the_loaded_body(height):
     frequency = np.sqrt(eigsh(root @ stiffness @ root, 1, which="LA", return_eigenvectors=False)[0])
     steps = LoadedSteps(SETUP, SETUP.start())
     for _ in range(10):
-        taken = steps.of(state)
+        taken = steps.needed(state)
     wanted = FRAME / (SHARE * replace(LIMIT, frequency=frequency).damped)
     assert taken == pytest.approx(wanted, rel=0.02, abs=1.0)
     assert height > 0.5 or taken > SETUP.clock.steps  # the load matters
@@ -45,4 +45,4 @@ def test_steps_follow_the_largest_frequency_of_the_loaded_body(height):
 
 def test_a_clock_without_a_limit_keeps_its_steps():
     setup = replace(SETUP, clock=replace(SETUP.clock, limit=None))
-    assert LoadedSteps(setup, setup.start()).of(squeezed(0.5)[0]) == setup.clock.steps
+    assert LoadedSteps(setup, setup.start()).needed(squeezed(0.5)[0]) == setup.clock.steps

@@ -14,6 +14,7 @@ from studies.catalog.accuracy import (
     headline,
     is_adaptive,
     judged_at_rest,
+    mixed,
 )
 from studies.catalog.work_precision import WORK_PRECISION
 from studies.meshing.graded_mesh import usual_grading
@@ -49,16 +50,16 @@ def test_every_rung_has_two_sizes_and_nothing_that_the_scene_refuses(scene):
         assert scene.skip(case.method.name) is None
         body = case.body
         rungs.setdefault((body.kind, body.graded, body.volumes, body.law), set()).add(body.nodes)
-    assert len(rungs) == 6 + bool(graded(scene))
+    assert len(rungs) == 6 + bool(graded(scene)) + len({body.graded for body in mixed(scene)})
     assert all(len(sizes) >= 2 for sizes in rungs.values())
 
 
 @pytest.mark.parametrize("scene", judged_at_rest(), ids=lambda scene: scene.name)
 def test_every_quadratic_recipe_runs_on_five_meshes_of_which_one_is_timed(scene):
     quadratic = [case for case in of(scene) if case.method == ImplicitVolume() and case.body.kind == "quadratic"]
-    recipes = [*even(scene), *graded(scene)]
+    recipes = [*even(scene), *graded(scene), *mixed(scene)]
     assert {case.body for case in quadratic} == {mesh for body in recipes for mesh in neighbours(body)}
-    assert [case.body for case in quadratic if case.timed] == recipes and headline(scene) == recipes[-1]
+    assert [case.body for case in quadratic if case.timed] == recipes and headline(scene) == (graded(scene) or even(scene))[-1]
     assert len(quadratic) == 5 * len(recipes) and {case.dt_fraction for case in quadratic} == {LONG}
     assert {case.body.mass for case in quadratic} == {"lumped" if why_inertia_matters(scene) else "stiffness"}
 
