@@ -59,7 +59,9 @@ def test_every_quadratic_recipe_runs_on_five_meshes_of_which_one_is_timed(scene)
     quadratic = [case for case in of(scene) if case.method == ImplicitVolume() and case.body.kind == "quadratic"]
     recipes = [*even(scene), *graded(scene), *mixed(scene)]
     assert {case.body for case in quadratic} == {mesh for body in recipes for mesh in neighbours(body)}
-    assert [case.body for case in quadratic if case.timed] == recipes and headline(scene) == (graded(scene) or even(scene))[-1]
+    assert [case.body for case in quadratic if case.timed] == recipes and headline(scene) == (
+        graded(scene) or even(scene)
+    )[-1]
     assert len(quadratic) == 5 * len(recipes) and {case.dt_fraction for case in quadratic} == {LONG}
     assert {case.body.mass for case in quadratic} == {"lumped" if why_inertia_matters(scene) else "stiffness"}
 
