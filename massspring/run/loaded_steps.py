@@ -4,10 +4,9 @@ section 5)."""
 import math
 
 import numpy as np
-from scipy.sparse import csr_array
+from scipy.sparse import coo_array, csr_array
 
 from massspring.analysis.stability import StepLimit
-from massspring.analysis.stiffness import edge_blocks
 from massspring.kernels.arrays.layout import BoundaryConditions
 from massspring.kernels.points.arrays import PointRows
 from massspring.kernels.points.elements import measure_into, push_into
@@ -44,8 +43,10 @@ class LoadedSteps:
         if self.limit is None:
             return
         body = setup.inside.body
-        ends, stiffness = body.springs.ends, body.springs.stiffness[:, None, None] * np.eye(3)
-        self.springs = csr_array(edge_blocks(ends, stiffness, body.node_count))
+        # Springs without length act on each axis alone: a matrix of nodes, with a ninth of the numbers of one of axes.
+        (i, j), k = body.springs.ends.T.astype(np.int64), body.springs.stiffness
+        entries = np.concatenate([k, k, -k, -k]), (np.r_[i, j, i, j], np.r_[i, j, j, i])
+        self.springs = csr_array(coo_array(entries, shape=(body.node_count, body.node_count)))
         self.nudge = math.sqrt(np.finfo(start.nodes.x.dtype).eps) * body.size
         self.vector = np.random.default_rng(0).standard_normal((body.node_count, 3))
         self.noise = NOISE / np.abs(self.vector).max() * self.vector
@@ -93,7 +94,7 @@ class LoadedSteps:
         for _ in range(count):
             q = self.vector
             scale = self.nudge / np.abs(q).max()
-            force = (self.springs @ q.ravel()).reshape(-1, 3) - (self._push(rows, x + scale * q) - begin) / scale
+            force = self.springs @ q - (self._push(rows, x + scale * q) - begin) / scale
             after = weight * force
             square = float(np.vdot(q, after) / np.vdot(q, q))
             self.vector = after / np.abs(after).max()
