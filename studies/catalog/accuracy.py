@@ -80,8 +80,9 @@ def mixed(scene: Scene) -> tuple[BodyRecipe, ...]:
     in two sizes, and adaptive; none where nothing is held."""
     if not scene.held:
         return ()
-    ways = [(size, False) for size in BUDGETS[:2]] + [(BUDGETS[1], ADAPTIVE)] * is_adaptive(scene)
-    return tuple(QuadraticBody(size, graded=way, mass=_mass(scene), volumes="mixed") for size, way in ways)
+    even = [QuadraticBody(size, mass=_mass(scene), volumes="mixed") for size in BUDGETS[:2]]
+    fine = QuadraticBody(BUDGETS[1], graded=ADAPTIVE, mass=_mass(scene), volumes="mixed")
+    return (*even, fine) if is_adaptive(scene) else tuple(even)
 
 
 def is_adaptive(scene: Scene) -> bool:
