@@ -105,10 +105,10 @@ def check_among(surroundings: Surroundings, method: Method) -> None:
         raise MassSpringError(f"method '{method.name}' does not apply to these surroundings: {reason}")
 
 
-def check_facets(precision: str, inside: Collection[bool]) -> None:
-    """Raises MassSpringError for single precision if obstacles touch points `inside` facets: the forces would differ in
-    the fourth digit."""
-    if precision == "float32" and any(inside):
+def check_facets(precision: str, body: Body, obstacles: Collection[object]) -> None:
+    """Raises MassSpringError for single precision if obstacles touch a body with contact inside facets: the forces
+    would differ in the fourth digit."""
+    if precision == "float32" and len(body.contact_facets) and obstacles:
         raise MassSpringError(
             "obstacles touch this quadratic body inside its facets, which runs in float64 only; "
             "leave precision at float64, or make the body with contact at its nodes"

@@ -103,6 +103,8 @@ class LoadedSteps:
     @staticmethod
     def _push(rows: PointRows, x: np.ndarray) -> np.ndarray:
         """The force of all volumes and of the local pressure at positions `x` (n, 3) [m], (n, 3) [N]."""
-        measure_into(rows, x, np.column_stack([x, np.zeros(len(x))]))
+        padded = np.zeros((len(x), 4), dtype=rows.tile.dtype)  # the kernels work in one precision
+        padded[:, :3] = x
+        measure_into(rows, padded[:, :3].copy(), padded)
         push_into(rows, rows.lam)
         return rows.push.copy()

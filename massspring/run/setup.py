@@ -70,7 +70,7 @@ class Setup:
         around = Surroundings(self.obstacles, len(self.attachments), self.gravity, bool(self.targets), moved)
         check_among(around, self.method)
         check_precision(self.precision, self.method)
-        check_facets(self.precision, [touches_inside(o, self.body, self.method) for o in self.solids])
+        check_facets(self.precision, self.body, self.solids)
         if self.pairs is not None:
             check_face_pairs(self.pairs, self.method, self.attachments, self.precision, bool(self.probes))
         limited = self.method.capabilities.conditionally_stable

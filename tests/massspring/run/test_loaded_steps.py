@@ -7,7 +7,7 @@ import pytest
 from scipy.sparse import diags_array
 from scipy.sparse.linalg import eigsh
 
-from massspring import ImplicitVolume, Setup, make_clock, quadratic_body, step_limit
+from massspring import ImplicitVolume, Setup, make_clock, quadratic_body, simulate, step_limit
 from massspring.analysis.stiffness import local_stiffness, point_hessian, spring_stiffness
 from massspring.run.loaded_steps import LoadedSteps
 from tests.massspring.quadratic import SOFT, quadratic_block
@@ -46,3 +46,12 @@ def test_steps_follow_the_largest_frequency_of_the_loaded_body(height):
 def test_a_clock_without_a_limit_keeps_its_steps():
     setup = replace(SETUP, clock=replace(SETUP.clock, limit=None))
     assert LoadedSteps(setup, setup.start()).needed(squeezed(0.5)[0]) == setup.clock.steps
+
+
+def test_single_precision_takes_as_many_steps():
+    """Its kernels write single numbers: handed doubles they would write beyond their arrays."""
+    single = replace(SETUP, precision="float32")
+    watch = LoadedSteps(single, single.start())
+    assert watch.needed(single.start()) == pytest.approx(SETUP.clock.steps, abs=1)
+    history = simulate(single)
+    assert history.outcome == "finished" and history.steps[0] == pytest.approx(SETUP.clock.steps, abs=1)
