@@ -74,8 +74,8 @@ class Body:
     local_bulk: float = 0.0
     """b [Pa]: a pressure −b (J_q − 1) at the points of `PointVolumes`, added to that of the volumes."""
     contact_facets: np.ndarray = field(default_factory=lambda: NO_FACETS)
-    """Quadratic facets at whose points obstacles touch a body of `PointVolumes`, (f, 6). If empty, obstacles touch
-    nodes."""
+    """Quadratic facets at whose points round obstacles touch a body of `PointVolumes`, (f, 6). If empty, all obstacles
+    touch nodes."""
     inertia: np.ndarray | None = None
     """Inertial mass of the nodes [kg], (n,), if it differs from `mass`; gravity always acts on `mass`."""
     share: np.ndarray | None = None

@@ -56,7 +56,7 @@ def quadratic_body(
     `points` (n, 3) [m]; `cells` (k, 10) in VTK's order, positive; `lumen` (f, 6) facets that enclose a lumen with a
     positive volume, as in FACETS, kept beside the tissue. `inertia`: what resists motion, the lumped mass, or
     "stiffness": the total mass shared by the diagonal of K, for scenes in which inertia does not matter (longer steps).
-    `contact`: where obstacles touch it, at points inside its facets or at its nodes alone, which is cheaper.
+    `contact`: where round obstacles touch it, at points inside its facets or at its nodes, as planes do; cheaper.
     `own_volumes` (k,) bool: the elements that keep their own volume, as where the pressure jumps; the rest keep one per
     vertex. Its surface and its tetrahedra are the four flat parts of each facet and the eight of each element. Raises
     MassSpringError for an element that folds at one of its points or whose parts do, and for other `own_volumes`.

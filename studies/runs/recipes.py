@@ -162,7 +162,8 @@ class QuadraticBody(BodyRecipe):
     """Which volumes are kept: one per vertex, with continuous pressures; one per element; "mixed": one per element with
     a node in a held region, at whose edge the pressure jumps, and one per vertex elsewhere."""
     contact: Literal["facets", "nodes"] = "facets"
-    """Where obstacles touch it: at points inside its facets, or at its nodes, which is cheaper."""
+    """Where spheres and capsules touch it: at points inside its facets, or at its nodes, which is cheaper. Planes touch
+    nodes."""
 
     def __post_init__(self) -> None:
         lookup(self.volumes, OF_QUADRATIC, "kind of volumes of a quadratic body")
