@@ -18,7 +18,7 @@ from studies.cli.commands.export import export
 from studies.cli.commands.fuzz import fuzz
 from studies.cli.commands.judge import judge
 from studies.cli.commands.list import list as list_names
-from studies.cli.commands.mesh import mesh
+from studies.cli.commands.mesh import mesh, mesh_check
 from studies.cli.commands.place import place
 from studies.cli.commands.profile import profile
 from studies.cli.commands.replay import replay
@@ -39,18 +39,21 @@ GROUPS: dict[str, tuple[Callable[..., None], ...]] = {
 }
 FORMER = {
     "calibrate": "is gone: quadratic bodies need no fit (`organbench advise` names one)",
-    "check": "is now `organbench mesh --check FILE`",
-    "cost": "is now `organbench profile`",
-    "mesh-check": "is now `organbench mesh --check FILE`",
-    "plot": "is now `organbench report STUDY`",
     "prune": "is gone: delete the folder of a study, and `organbench run` computes it again",
     "publish": "is gone: `python -m studies.lab.publish` in a clone does it",
     "restamp": "is gone: `organbench run` computes what another code has made",
-    "status": "is now `organbench show STUDY`",
-    "stress": "is now `organbench fuzz`",
     "verify": "is now `python -m studies.lab.verify`, in a clone of the repository",
 }
 """Commands of earlier versions, and what stands in their place."""
+RENAMED: dict[str, Callable[..., None]] = {
+    "check": mesh_check,
+    "cost": profile,
+    "mesh-check": mesh_check,
+    "plot": report,
+    "status": show,
+    "stress": fuzz,
+}
+"""Former names that scripts may have; the help does not list them."""
 
 
 class Commands(TyperGroup):
@@ -97,3 +100,5 @@ def add_commands(app: typer.Typer) -> None:
         for function in functions:
             line = (function.__doc__ or "").split("\n\n")[0].split(". ")[0].rstrip(".") + "."
             app.command(function.__name__.replace("_", "-"), short_help=line, rich_help_panel=group)(function)
+    for name, function in RENAMED.items():
+        app.command(name, hidden=True)(function)

@@ -21,10 +21,20 @@ VIRTUAL = "virtual"
 """Value of `cut` for a body that is cut through its cells."""
 
 
+class _ByKind(type):
+    """Lets `BodyRecipe("quadratic", 594)`, as written for release 0.3, make a QuadraticBody."""
+
+    def __call__(cls, *given: Any, **settings: Any) -> Any:
+        if cls is not BodyRecipe:
+            return super().__call__(*given, **settings)
+        kind, given = (given[0], given[1:]) if given else (settings.pop("kind", USUAL["kind"]), given)
+        return lookup(kind, BODIES, "kind of body")(*given, **settings)
+
+
 @dataclass(frozen=True)
-class BodyRecipe:
-    """How a body is made: one of KINDS. A setting that has no meaning for a kind of body is no setting of its recipe;
-    who asks for it gets the answer of this class."""
+class BodyRecipe(metaclass=_ByKind):
+    """How a body is made: one of KINDS, also by `BodyRecipe(kind, nodes, ...)`. A setting that has no meaning for a
+    kind of body is no setting of its recipe; who asks for it gets the answer of this class."""
 
     kind: ClassVar[str]
     law, volumes, regions, graded = "", "scene", 0, False
@@ -38,10 +48,7 @@ class BodyRecipe:
     """Factor on every spring; 1 matches the tissue's shear modulus."""
 
     def __new__(cls, *given: object, **settings: object) -> Self:
-        """Raises StudyError where the kind is not said, and for a setting that it does not have."""
-        if cls is BodyRecipe:
-            one_of = ", ".join(f"{body.__name__}(...)" for body in KINDS)
-            raise StudyError(f"a BodyRecipe is of one kind; write one of {one_of}")
+        """Raises StudyError for a setting that it does not have."""
         _check_own(cls, settings)
         return super().__new__(cls)
 

@@ -78,8 +78,7 @@ def mesh(
     if check is not None:
         if name or source is not None:
             raise StudyError("--check FILE makes no mesh; leave out the organ, and --from")
-        ask_before_large(check, yes)
-        examined(source_of(check, unit, scale, longest_side, part), (modulus, density), as_json)
+        mesh_check(check, unit, scale, longest_side, part, as_json, modulus, density, yes)
     check_unit(write_unit)
     check_target(output, source)
     filled = check_filling(output, fill, order)
@@ -150,6 +149,22 @@ class Made(NamedTuple):
 
     def errors(self, truth: Organ) -> ShapeErrors:
         return shape_errors(truth, self.sides, filled=len(self.mesh.tetrahedra) > 0)
+
+
+def mesh_check(
+    file: Path,
+    unit: Unit = None,
+    scale: Scale = 1.0,
+    longest_side: LongestSide = None,
+    part: Part = None,
+    as_json: Annotated[bool, typer.Option("--json")] = False,
+    modulus: float = TISSUE[0],
+    density: float = TISSUE[1],
+    yes: Yes = False,
+) -> None:
+    """`organbench mesh --check FILE` by its former name."""
+    ask_before_large(file, yes)
+    examined(source_of(file, unit, scale, longest_side, part), (modulus, density), as_json)
 
 
 def check_filling(output: Path, fill: bool | None, order: int) -> bool:

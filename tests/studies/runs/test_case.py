@@ -141,6 +141,7 @@ def test_a_recipe_of_release_0_3_is_read(kind, more):
     assert recipe_from_dict(old | {"stiffness": 2.0}).stiffness == 2.0
     with pytest.raises(StudyError, match="has no setting 'sides'"):
         recipe_from_dict(old | {"sides": 3})
+    assert BodyRecipe(kind, 80) == BODIES[kind](80)
     if kind != "tetrahedral":
         with pytest.raises(StudyError, match=f"a {kind} body has no setting 'law'"):
             recipe_from_dict(old | {"law": "uniform"})
@@ -149,7 +150,7 @@ def test_a_recipe_of_release_0_3_is_read(kind, more):
 @pytest.mark.parametrize(
     ("kind", "settings", "message"),
     [
-        (BodyRecipe, {}, r"a BodyRecipe is of one kind; write one of TetrahedralBody\(...\), SurfaceBody"),
+        (BodyRecipe, {"kind": "quadratics"}, "unknown kind of body 'quadratics'; did you mean 'quadratic'"),
         (
             SurfaceBody,
             {"graded": True},
