@@ -9,17 +9,24 @@ from matplotlib.lines import Line2D
 
 from studies.base.counting import heading, readable
 from studies.plots.style.page import blank, finish, log_axis, panel_grid
-from studies.plots.style.style import BLUE, GREEN, LIGHT, ORANGE, SMALL, VERMILLION, drawing, styled
+from studies.plots.style.style import BLUE, GREEN, LIGHT, ORANGE, PURPLE, SMALL, VERMILLION, drawing, styled
 from studies.reference.uncertainty import Uncertainty
 
 TITLE = "Uncertainty of the references"
-LOOKS = {"mesh": (BLUE, "o"), "contact": (VERMILLION, "s"), "kappa": (GREEN, "^"), "steps": (ORANGE, "D")}
+LOOKS = {
+    "mesh": (BLUE, "o"),
+    "contact": (VERMILLION, "s"),
+    "kappa": (GREEN, "^"),
+    "steps": (ORANGE, "D"),
+    "edge": (PURPLE, "v"),
+}
 """Colour and marker of each share."""
 WORDS = {
     "mesh": "mesh (finest three)",
     "contact": "contact (penalty × 3)",
     "kappa": "bulk modulus (× 10)",
     "steps": "load steps (halved)",
+    "edge": "elements at held edges",
 }
 LOWEST = 1e-4
 """Smaller shares are drawn here [%]; they do not matter."""

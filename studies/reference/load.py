@@ -4,6 +4,8 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
+import numpy as np
+
 from studies.base.errors import StudyError
 from studies.reference.published import published, record_of
 from studies.reference.reference_solves import ReferenceSolve
@@ -45,7 +47,8 @@ class Reference(Solution):
     @cached_property
     def uncertainty(self) -> dict[str, Uncertainty]:
         """Uncertainty of each quantity by shares."""
-        return uncertainties(self.scene, self.at, self.meshes, self.variants)
+        least_j = float(np.nanmin(self.field("min_j")))
+        return uncertainties(self.scene, self.at, self.meshes, self.variants, least_j)
 
     @cached_property
     def total_uncertainty(self) -> dict[str, float]:

@@ -43,7 +43,9 @@ def uncertainty_table(references: Mapping[str, Reference]) -> pd.DataFrame:
     for scene, reference in references.items():
         shape = shape_of_reference(reference)
         for quantity, uncertainty in reference.uncertainty.items():
-            shares = {f"{name} [%]": 100 * uncertainty.shares.get(name, float("nan")) for name in ("mesh", *FACTORS)}
+            shares = {
+                f"{name} [%]": 100 * uncertainty.shares.get(name, float("nan")) for name in ("mesh", "edge", *FACTORS)
+            }
             rows.append(
                 {
                     "scene": scene,

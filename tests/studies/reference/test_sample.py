@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from reference_fem.uncertainty import NESTED_SAFETY
 from studies.base.errors import StudyError
 from studies.reference.nested import DISPLACEMENT, fine_enough
 from studies.reference.sample import SERIES, Sample, SamplePoints, sample_fields, samples_in
@@ -84,12 +85,12 @@ def test_a_bar_of_nested_meshes_is_the_safety_times_their_error(name):
     scale = {"surface_mean": np.linalg.norm(POINTS * [0.1, -0.1, 0.2], axis=1)}.get(name)
     size = 1.0 if scale is None else AT.areas @ scale / AT.areas.sum() / scale.max()
     bar = uncertainty_of_meshes(BALL_CLAMPED, AT, meshes, name)
-    assert bar.uncertainty == pytest.approx(1.25 * error * size, rel=1e-3)
+    assert bar.uncertainty == pytest.approx(NESTED_SAFETY * error * size, rel=1e-3)
     assert (bar.shift, bar.monotone) == (0.0, False)
 
 
-def uncertainties_of(meshes):
-    return uncertainties(BALL_CLAMPED, AT, meshes, {})
+def uncertainties_of(meshes, least_j=0.5):
+    return uncertainties(BALL_CLAMPED, AT, meshes, {}, least_j)
 
 
 def bars_of(meshes):
@@ -100,11 +101,20 @@ def test_settings_are_compared_with_the_coarsest_mesh_and_add_to_the_bar():
     meshes = family()
     off = meshes[-1].force * 1.01
     better = {"steps": replace(meshes[-1], variant="steps", force=off), "kappa": replace(meshes[-1], variant="kappa")}
-    bar = uncertainties(BALL_CLAMPED, AT, meshes, better)["force_end"]
+    bar = uncertainties(BALL_CLAMPED, AT, meshes, better, 0.5)["force_end"]
     assert bar.shares["kappa"] == 0.0 and set(bar.shares) == {"mesh", "steps", "kappa"}
     change = 1 - 1 / 1.01
     assert bar.shares["steps"] == pytest.approx(change / (1 - 1 / FACTORS["steps"]), rel=1e-9)
     assert bar.total == pytest.approx(np.hypot(bar.shares["mesh"], bar.shares["steps"]), rel=1e-12)
+
+
+def test_a_strained_held_edge_has_a_share():
+    """Of all quantities but the volume; not in a body that nothing holds, or whose least J is larger."""
+    strained = uncertainties_of(family(), 0.09)
+    assert {name for name, bar in strained.items() if "edge" in bar.shares} == set(strained) - {"volume"}
+    assert strained["force"].total == pytest.approx(np.hypot(0.002, uncertainties_of(family())["force"].total))
+    free = uncertainties(replace(BALL_CLAMPED, held=()), AT, family(), {}, 0.09)
+    assert not any("edge" in bar.shares for bars in (free, uncertainties_of(family(), 0.11)) for bar in bars.values())
 
 
 @pytest.mark.filterwarnings("error")
@@ -112,7 +122,7 @@ def test_settings_are_compared_with_the_coarsest_mesh_and_add_to_the_bar():
 def test_a_force_that_is_zero_has_no_relative_bar(scene):
     """An obstacle that never touches: nested meshes, and octants by Richardson's extrapolation."""
     meshes = [replace(one, force=0.0 * one.force, size=0.01 * k) for k, one in enumerate(family(), 1)]
-    bars = uncertainties(scene, AT, meshes, {"steps": replace(meshes[-1], variant="steps")})
+    bars = uncertainties(scene, AT, meshes, {"steps": replace(meshes[-1], variant="steps")}, 0.5)
     assert np.isnan(bars["force"].total) and np.isnan(bars["force_end"].total) and bars["volume"].total > 0
 
 
