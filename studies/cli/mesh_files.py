@@ -15,7 +15,7 @@ from studies.geometry.files.faults import check_promises, size_warning
 from studies.geometry.files.formats import opened
 from studies.geometry.files.units import UNITS, Source, check_unit, length_of, likely_units, unit_question
 
-Unit = Annotated[str | None, typer.Option(help="unit of the file's coordinates: m, cm, mm or in")]
+Unit = Annotated[str | None, typer.Option(help="unit of the file's coordinates: m, cm, mm, um or in")]
 Scale = Annotated[float, typer.Option(help="factor on the file's coordinates")]
 LongestSide = Annotated[str | None, typer.Option(help="longest side of the body, such as 19cm, instead of --unit")]
 Part = Annotated[str | None, typer.Option(help="a body of the file: its name, number or mask label")]

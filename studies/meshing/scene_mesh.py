@@ -6,6 +6,7 @@ from studies.base.errors import StudyError
 from studies.base.lookup import lookup
 from studies.geometry import OrganMesh, fill, organ, read_mesh, scan
 from studies.geometry.organs import SHAPES
+from studies.geometry.shape.regions import Region, held_nodes
 from studies.meshing.quadratic_mesh import QuadraticMesh
 from studies.scene.organ_file import remeshed, scanned
 from studies.scene.scene import Scene
@@ -40,8 +41,8 @@ def mesh_for(
     return fill(mesh) if filled and not len(mesh.tetrahedra) else mesh
 
 
-def patch_nodes(mesh: OrganMesh | QuadraticMesh, name: str, region: object) -> np.ndarray:
+def patch_nodes(mesh: OrganMesh | QuadraticMesh, name: str, region: Region) -> np.ndarray:
     """Surface nodes of a patch: those of the patch of the mesher, or for a mesh from a file those inside the region."""
     if name in mesh.patches:
         return mesh.patches[name]
-    return np.flatnonzero(region.level(mesh.points[: mesh.surface_count]) <= 0)  # pyright: ignore[reportAttributeAccessIssue]
+    return held_nodes(region, mesh.points[: mesh.surface_count])

@@ -64,7 +64,7 @@ def mesh(
     scale: Scale = 1.0,
     longest_side: LongestSide = None,
     part: Part = None,
-    write_unit: Annotated[str, typer.Option(help="unit of the written lengths: m, cm, mm or in")] = "m",
+    write_unit: Annotated[str, typer.Option(help="unit of the written lengths: m, cm, mm, um or in")] = "m",
     check: Annotated[Path | None, typer.Option(metavar="FILE", help="only list the faults of this mesh")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="as JSON (--check; docs/meshes.md lists the keys)")] = False,
     modulus: Annotated[float, typer.Option(help="shear modulus \\[Pa], for the time step of --check")] = TISSUE[0],

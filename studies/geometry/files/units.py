@@ -9,9 +9,9 @@ import numpy as np
 
 from studies.base.errors import StudyError
 
-UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "in": 0.0254}
+UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254}
 GUESSED = ("m", "cm", "mm")
-"""Units in which a size is compared with that of organs; inches have to be given."""
+"""Units in which a size is compared with that of organs; the others have to be given."""
 ORGAN = 0.02, 0.6
 """Longest side [m] of an organ: from a foetal kidney to the lungs of an adult."""
 LARGEST, SMALLEST = 5.0, 1e-3
@@ -22,7 +22,7 @@ FAR_AWAY = 1e3
 """Distance from the origin [m] beyond which coordinates have too few digits left for an organ."""
 ABSURD = 1e6, 1e-9
 """Longest side [m] above and below which a file is not even examined."""
-NAMES = {"m": "metres", "cm": "centimetres", "mm": "millimetres", "in": "inches"}
+NAMES = {"m": "metres", "cm": "centimetres", "mm": "millimetres", "um": "micrometres", "in": "inches"}
 
 
 @dataclass(frozen=True)
@@ -137,7 +137,8 @@ def settled_unit(name: str, side: float, unit: str | None) -> str:
     """`unit` if it is given, else "m" if only metres give the size of an organ; side: longest side in the unit of the
     file, scaled. Raises StudyError for an unknown unit, and if the user has to give it."""
     if unit is not None:
-        check_unit(unit)
+        if unit not in UNITS:
+            raise StudyError(f"{name} states its lengths in an unknown unit, {unit!r}; say --unit {', '.join(UNITS)}")
         return unit
     if likely_units(side) == ["m"]:
         return "m"

@@ -21,7 +21,7 @@ from massspring.sources import source_fingerprint
 from studies.base.errors import StudyError
 from studies.geometry.mesh.organ_mesh import OrganMesh
 from studies.geometry.mesher.process import STOPPED, followed
-from studies.geometry.shape.regions import ON_CURVE, region_from_dict
+from studies.geometry.shape.regions import held_nodes, region_from_dict
 
 TIME_LIMIT = 300.0
 """Processor time [s] after which a meshing job is stopped: 20 times that of the largest one."""
@@ -121,11 +121,9 @@ def stored_in(path: Path, parts: tuple[str, ...]) -> dict[str, np.ndarray] | Non
 def patches_of(mesh: OrganMesh, regions: dict[str, dict[str, Any]]) -> dict[str, np.ndarray]:
     """Outer nodes inside each region or on its outline. Raises StudyError for a region without nodes."""
     surface = mesh.points[: mesh.outer_count]
-    # Nodes are on an outline to ON_CURVE of the box of the shape, which is somewhat larger than the mesh.
-    tolerance = 10 * ON_CURVE * float(np.linalg.norm(np.ptp(surface, axis=0)))
     patches = {}
     for name, data in regions.items():
-        patches[name] = np.flatnonzero(region_from_dict(data).level(surface) <= tolerance)
+        patches[name] = held_nodes(region_from_dict(data), surface)
         if not len(patches[name]):
             raise StudyError(
                 f"{mesh.name}: region {name!r} holds no surface node; move or enlarge it, or use more nodes"

@@ -113,6 +113,17 @@ KnownRegion = HalfSpace | BallRegion | EllipsoidRegion | PaintedRegion
 KINDS: dict[str, type] = {cls.__name__: cls for cls in (HalfSpace, BallRegion, EllipsoidRegion, PaintedRegion)}
 
 
+def held_nodes(region: Region, points: np.ndarray) -> np.ndarray:
+    """Numbers of the nodes (n, 3) [m] of a surface that lie in a region or on its outline.
+
+    Nodes are on an outline to ON_CURVE of the box of the shape, which is somewhat larger than the mesh, and to the
+    rounding of their coordinates, which a file may hold in single precision: so a body holds the same nodes wherever it
+    lies.
+    """
+    box, farthest = np.linalg.norm(np.ptp(points, axis=0)), np.abs(points).max(initial=0.0)
+    return np.flatnonzero(region.level(points) <= 10 * ON_CURVE * box + 2.0 * np.finfo(np.float32).eps * farthest)
+
+
 def region_to_dict(region: Any) -> dict[str, Any]:
     """JSON-able form of a region; raises StudyError for anything that is not one of KINDS."""
     kind = type(region).__name__

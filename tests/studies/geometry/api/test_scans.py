@@ -110,7 +110,7 @@ def test_units_are_never_guessed(block, tmp_path):
         scan(path, 200)
     assert str(caught.value) == (
         "block.vtu does not say its unit; its longest side is 60, the size of an organ in centimetres or millimetres; "
-        "say --unit mm (or another of m, cm, mm, in), or --longest-side 19cm"
+        "say --unit mm (or another of m, cm, mm, um, in), or --longest-side 19cm"
     )
     assert scan(write(tmp_path / "metres.ply", MM * points, faces), fill=False).recipe["unit"] == "m"
 

@@ -112,7 +112,7 @@ REFUSED = {
     "a scale of nan": {"scale": float("nan")},
     "an organ has 1 mm to 5 m": {"longest_side": 12.0},
     "give the longest side, or a unit and a scale, but not both": {"longest_side": 0.1, "unit": "mm"},
-    "use one of m, cm, mm, in": {"unit": "furlong"},
+    "use one of m, cm, mm, um, in": {"unit": "furlong"},
 }
 
 

@@ -1,7 +1,9 @@
 """Label masks: the surface of one label, as large as its voxels, in the place that the header gives it."""
 
 import builtins
+import os
 import warnings
+from dataclasses import replace
 
 import nibabel
 import nrrd
@@ -12,6 +14,7 @@ from studies.base.errors import StudyError
 from studies.geometry import check_surface, read_mesh, scan
 from studies.geometry.files.formats import opened
 from studies.geometry.files.units import Source
+from studies.geometry.mesh.organ_mesh import signed_volume
 
 SPACING = (1.0, 1.5, 2.0)
 AXES = (28.0, 24.0, 20.0)
@@ -47,7 +50,7 @@ def test_a_label_becomes_a_surface_of_its_volume_in_its_place(mask):
     surface = scan(Source(mask, part="1"), fill=False)
     check_surface(surface.points, surface.triangles)
     labels, _ = ellipsoid()
-    assert surface.volume == pytest.approx(1e-9 * np.prod(SPACING) * (labels == 1).sum(), rel=0.01)
+    assert surface.volume == pytest.approx(1e-9 * np.prod(SPACING) * (labels == 1).sum(), rel=1e-3)
     np.testing.assert_allclose(1e3 * surface.points.mean(axis=0), MIDDLE, atol=0.5)
     np.testing.assert_allclose(1e3 * np.ptp(surface.points, axis=0), 2 * np.array(AXES), rtol=0.05)
     # Near the true ellipsoid everywhere, and not a staircase of voxels.
@@ -60,6 +63,94 @@ def test_a_mirrored_image_still_looks_outward(tmp_path):
     path = nifti(tmp_path / "turned.nii", labels, np.diag([-1.0, 1, 1, 1]) @ affine)
     surface = read_mesh(Source(path, part="1"))
     assert surface.volume > 0 and surface.points[:, 0].mean() == pytest.approx(-1e-3 * MIDDLE[0], abs=1e-3)
+
+
+@pytest.mark.parametrize("across", [2, 3, 8])
+def test_a_small_label_has_the_volume_of_its_voxels(tmp_path, across):
+    grid = np.stack(np.meshgrid(*[np.arange(across + 4) - (across + 3) / 2] * 3, indexing="ij"), axis=-1)
+    labels = ((grid**2).sum(axis=-1) < across**2 / 4).astype(np.uint8)
+    content = opened(Source(nifti(tmp_path / "ball.nii", labels, np.diag([5.0, 5.0, 9.0, 1.0]))))
+    assert signed_volume(content.points, content.triangles) == pytest.approx(225 * labels.sum(), rel=1e-3)
+
+
+def slicer(path, labels, affine, signs=(1, 1, 1), **header):
+    """An NRRD file of the same body as a NIfTI image with this affine; signs: of its space."""
+    turned = np.diag([*signs, 1.0]) @ affine
+    header = {"space directions": turned[:3, :3].T, "space origin": turned[:3, 3]} | header
+    nrrd.write(str(path), labels, {key.replace("_", " "): value for key, value in header.items()})
+    return path
+
+
+SPACES = {
+    "right-anterior-superior": (1, 1, 1),
+    "left-posterior-superior": (-1, -1, 1),
+    "left-anterior-superior": (-1, 1, 1),
+    "LPS": (-1, -1, 1),
+}
+
+
+@pytest.mark.parametrize("space", SPACES)
+def test_one_patient_lies_in_the_same_place_in_either_format(tmp_path, mask, space):
+    path = slicer(tmp_path / "liver.nrrd", *ellipsoid(), SPACES[space], space=space)
+    with pytest.warns(UserWarning, match="assuming millimetres"):
+        content = opened(Source(path, part="1"))
+    expected = opened(Source(mask, part="1"))
+    assert content.unit == expected.unit == "mm"
+    np.testing.assert_allclose(content.points, expected.points, atol=1e-4)
+    assert signed_volume(content.points, content.triangles) > 0
+
+
+def test_without_a_patient_space_the_sides_are_uncertain(tmp_path):
+    path = slicer(tmp_path / "liver.nrrd", *ellipsoid(), space_units=["mm"] * 3)
+    with pytest.warns(UserWarning, match=r"liver\.nrrd: its header names no patient space, so left and right may be"):
+        assert opened(Source(path, part="1")).unit == "mm"
+
+
+UNITS = {"microns": "um", "micrometer": "um", "millimeter": "mm", "Meters": "m", "inches": "in"}
+
+
+def test_a_header_states_the_unit(tmp_path):
+    for stated, unit in UNITS.items():
+        path = slicer(tmp_path / "a.nrrd", *ellipsoid(), space="RAS", space_units=[stated] * 3)
+        assert opened(Source(path, part="1")).unit == unit
+    for stated, unit in {"micron": "um", "mm": "mm", "meter": "m"}.items():
+        path = nifti(tmp_path / "a.nii", *ellipsoid(), unit=stated)
+        assert opened(Source(path, part="1")).unit == unit
+
+
+def test_segments_of_slicer_may_overlap(tmp_path):
+    """3D Slicer writes overlapping segments as layers, an array (l, a, b, c)."""
+    labels, affine = ellipsoid()
+    layers = np.stack([labels == 1, np.roll(labels, 5, 0) == 1, labels == 2], axis=0).astype(np.uint8)
+    names = {}
+    for k, name in enumerate(["Liver", "tumour", "stone"]):
+        names |= {f"Segment{k}_Layer": str(k), f"Segment{k}_LabelValue": "1", f"Segment{k}_Name": name}
+    path, rows = tmp_path / "two.seg.nrrd", np.vstack([np.full(3, np.nan), affine[:3, :3].T])
+    header = {"kinds": ["list", *["domain"] * 3], "space directions": rows, "space origin": affine[:3, 3]}
+    nrrd.write(str(path), layers, header | names | {"space": "RAS", "space units": ["mm"] * 3})
+    middles = [read_mesh(Source(path, part=name)).points.mean(axis=0) for name in ("liver", "tumour")]
+    np.testing.assert_allclose(1e3 * (middles[1] - middles[0]), (5, 0, 0), atol=1e-3)
+    with pytest.raises(StudyError, match=r"3 labels: 1 \(Liver\) of .*; 3 of them are called '1'"):
+        opened(Source(path, part="1"))
+    nrrd.write(str(path), layers, header | {"kinds": ["RGB-color", *["domain"] * 3], "space": "RAS"})
+    with pytest.raises(StudyError, match="has an axis of kind 'RGB-color', so it is no label mask"):
+        opened(Source(path))
+
+
+def test_the_data_of_a_header_lie_in_its_folder(tmp_path):
+    folder = tmp_path / "here"
+    folder.mkdir()
+    slicer(folder / "a.nhdr", *ellipsoid(), space="RAS", space_units=["mm"] * 3)
+    file = next(name for name in folder.iterdir() if name.suffix != ".nhdr")
+    header = (folder / "a.nhdr").read_text()
+    assert opened(Source(folder / "a.nhdr", part="1")).unit == "mm"
+    (tmp_path / file.name).write_bytes(file.read_bytes())
+    (folder / "link").symlink_to(tmp_path / file.name)
+    os.mkfifo(folder / "pipe")
+    for other in (f"../{file.name}", str(file), "link", "pipe", "missing"):
+        (folder / "a.nhdr").write_text(header.replace(file.name, other))
+        with pytest.raises(StudyError, match="is no file in the folder of the header; put it there, and give its name"):
+            opened(Source(folder / "a.nhdr", part="1"))
 
 
 def test_segments_of_slicer_have_names(tmp_path):
@@ -108,6 +199,13 @@ def test_what_is_no_mask_gets_a_sentence(tmp_path, mask):
     nrrd.write(str(nowhere), labels, {"spacings": [1.0, np.nan, 2.0]})
     half = tmp_path / "half.nii.gz"
     half.write_bytes(mask.read_bytes()[:900])
+    codes = nifti(tmp_path / "codes.nii", *ellipsoid())
+    with open(codes, "r+b") as file:
+        file.seek(123)  # xyzt_units
+        file.write(b"\5")
+    furlongs = slicer(tmp_path / "furlongs.nrrd", labels, affine, space="RAS", space_units=["furlong"] * 3)
+    mixed = slicer(tmp_path / "mixed.nrrd", labels, affine, space="RAS", space_units=["mm", "um", "mm"])
+    mirror = slicer(tmp_path / "mirror.nrrd", labels, affine, space="3D-left-handed")
     cases = {
         "liver.nii.gz holds 2 labels: .*; there is no '7' among them": Source(mask, part="7"),
         "holds 2 labels: 1 of .* voxels, 2 of 27 voxels; choose one by --part": Source(mask),
@@ -124,11 +222,16 @@ def test_what_is_no_mask_gets_a_sentence(tmp_path, mask):
         "holds no label: every voxel is 0": Source(nifti(tmp_path / "no.nii", 0 * labels, affine)),
         r"no_space\.nrrd does not say how its three axes lie in space": Source(nowhere),
         "has 4 dimensions": Source(nifti(tmp_path / "two.nii", np.stack([labels, labels], axis=-1), affine)),
+        r"furlongs\.nrrd states its lengths in an unknown unit, 'furlong'; say --unit m, cm": Source(furlongs),
+        r"codes\.nii states its lengths in an unknown unit, 'with the code 5'": Source(codes),
+        r"mixed\.nrrd has axes in different units \(mm, um\)": Source(mixed),
+        r"mirror\.nrrd is in the space '3d-left-handed', a mirror image; export it as right-": Source(mirror),
         "half.nii.gz is not a mesh that can be read .it is cut short": Source(half),
     }
     for sentence, source in cases.items():
         with pytest.raises(StudyError, match=sentence) as caught:
-            opened(source)
+            content = opened(replace(source, part="1") if source.part is None and "unit" in sentence else source)
+            source.metres(content.longest_side, content.unit)
         assert "\n" not in str(caught.value)
 
 
