@@ -1,121 +1,62 @@
-"""The tables of two results folders, row by row, metric by metric, and what a change means given its uncertainty."""
+"""What two results folders hold, case by case and number by number, and what a change means given its uncertainty.
 
-import re
-from collections import defaultdict
-from collections.abc import Hashable, Iterable
+Records speak for themselves; a table speaks only for a folder without any, as results/published.
+"""
+
+from collections import Counter
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass, fields, replace
-from enum import StrEnum
+from functools import cached_property
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
 
 from studies.base.errors import StudyError
+from studies.metrics.change import (
+    METRIC,
+    REFERENCE,
+    ROW,
+    SPEEDS,
+    STATUS,
+    TIMES,
+    Change,
+    Named,
+    Row,
+    Verdict,
+    record_changes,
+    row_changes,
+)
 from studies.metrics.metrics import METRICS
-from studies.runs.case import case_from_json
+from studies.metrics.run import Run
+from studies.metrics.table import row_of
+from studies.metrics.timing.cases import timing_of
+from studies.reference.load import Reference, reference_for
+from studies.runs.case import Case, case_from_json
 from studies.runs.recipe_text import recipe_text
-from studies.scene.quantities import ALWAYS
-from studies.store.machine import machine_of
-from studies.store.paths import record_files
+from studies.scene.as_json import scene_to_json
+from studies.scene.scene import Scene
+from studies.store.machine import machine_id, machine_of
+from studies.store.paths import SUFFIX, TIMING, index_path, record_files, timing_name
 from studies.store.record import Record, read_record
 
-ROUND_OFF = 1e-5
-"""Relative difference below which numbers are equal: tables have six digits."""
-
-
-class Verdict(StrEnum):
-    """Relation of a number in one folder to that in the other."""
-
-    SAME_BITS = "same bits"
-    ROUND_OFF = "round-off"
-    WITHIN_FLOOR = "within floor"
-    MOVED = "moved"
-    NOT_RESOLVABLE = "not resolvable"
-    OTHER_MACHINE = "other machine"
-    OTHER_REFERENCE = "other reference"
-
-
-MEANING: dict[Verdict, str] = {
-    Verdict.SAME_BITS: "the records of both folders are equal to the last bit, and so are the numbers",
-    Verdict.ROUND_OFF: f"equal to a relative {ROUND_OFF:g}, which is what a table shows",
-    Verdict.WITHIN_FLOOR: "the change is within the uncertainty of the reference, or within the spread of the timing",
-    Verdict.MOVED: "the change is larger than that uncertainty",
-    Verdict.NOT_RESOLVABLE: "the number has no stated uncertainty, or one folder lacks it",
-    Verdict.OTHER_MACHINE: "a time from another machine; it is not compared",
-    Verdict.OTHER_REFERENCE: "an error against another reference, or another published set; it is not compared",
-}
-
-
-def verdict_of(old: float, new: float, floor: float, same_bits: bool) -> Verdict:
-    """The verdict on a number that was `old` and is `new`. floor: its uncertainty, NaN if none is stated; same_bits:
-    whether the records from which it was computed are equal."""
-    change = abs(new - old)
-    if change != change:
-        return Verdict.NOT_RESOLVABLE
-    if change <= ROUND_OFF * max(abs(old), abs(new)):
-        return Verdict.SAME_BITS if same_bits and change == 0.0 else Verdict.ROUND_OFF
-    if floor != floor:
-        return Verdict.NOT_RESOLVABLE
-    return Verdict.WITHIN_FLOOR if change <= floor else Verdict.MOVED
-
-
 Key = tuple[str, str]
-"""Scene and recipe."""
-Row = dict[Hashable, Any]
-METRIC = re.compile(r"^(?P<name>\w+) \[(?P<unit>[^\]]+)\]$")
-STATUS = "status"
-ROW = ("scene", "body", "method", "nodes", "law", "dt/dt_c", "recipe")
-"""Columns of a table that identify the case of a row."""
-MORE: tuple[tuple[str, ...], ...] = ((), ("law",), ("step",), ("law", "step"), ("recipe",))
-"""Further columns in the name of a case, besides body, nodes and method, in the order in which they are tried."""
-TIMES = tuple(metric.name for metric in METRICS if metric.spread is not None)
-SPEEDS = tuple(metric.name for metric in METRICS if metric.spread is not None and metric.better == "higher")
-"""TIMES: metrics that depend on the machine; SPEEDS: those of them that are speeds."""
-JUDGED = tuple(metric.name for metric in METRICS if metric.quantity not in (None, *ALWAYS))
-"""Metrics that compare with the reference."""
-REFERENCE = "reference"
-"""Column that names the reference; older tables, without published sets of references, lack it."""
-
-
-class Named(NamedTuple):
-    """A case as tables name it."""
-
-    study: str
-    scene: str
-    body: str
-    method: str
-    nodes: str
-    law: str
-    step: str
-    """Time step over the stability limit."""
-    recipe: str
-
-
-@dataclass(frozen=True)
-class Change:
-    """A number of a case in both folders."""
-
-    case: Named
-    metric: str
-    unit: str
-    old: float | str
-    new: float | str
-    floor: float
-    """Its uncertainty, the larger of both, in its unit; NaN if none is stated."""
-    verdict: Verdict
-
-    @property
-    def is_time(self) -> bool:
-        """Whether the number is a computing time, or a speed: it depends on the machine."""
-        return self.metric in TIMES
+"""Scene and recipe of a case."""
+NUMBER = " number "
+"""Between a recipe and its number, where several rows of a scene have it."""
+NAMED = 3
+"""Names in a sentence."""
+AGAIN = "write it again with `organbench report`"
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """All changes of the cases in both folders, and the number of other rows."""
+    """All changes of the cases in both folders, the number of other cases, and what is missing or damaged."""
 
     changes: list[Change]
+    findings: list[str]
+    """A sentence for each file that cannot be read, and for what a folder should hold and lacks."""
     only_old: int
     only_new: int
 
@@ -141,7 +82,8 @@ class Comparison:
         return float(np.median(ratios)) if ratios else float("nan")
 
     def table(self) -> pd.DataFrame:
-        return pd.DataFrame([change.case._asdict() | _numbers(change) for change in self.changes])
+        names = [field.name for field in fields(Change) if field.name != "case"]
+        return pd.DataFrame([one.case._asdict() | {name: getattr(one, name) for name in names} for one in self.changes])
 
     def counts(self, times: bool) -> dict[Verdict, int]:
         """The count of each verdict among times (`times`), or among other numbers, in the order of Verdict."""
@@ -149,124 +91,205 @@ class Comparison:
         return {verdict: verdicts.count(verdict) for verdict in Verdict}
 
 
-def _numbers(change: Change) -> dict[str, object]:
-    return {field.name: getattr(change, field.name) for field in fields(change) if field.name != "case"}
+class Stored(NamedTuple):
+    """A record in a folder."""
+
+    file: str
+    record: Record
+    case: Case | None
+    """None for a record of another kind than a run, and for a method of a user's file."""
+
+    @property
+    def key(self) -> Key:
+        return (self.case.scene.name, recipe_text(self.case)) if self.case else ("", self.file)
 
 
-def compare(old: Path, new: Path) -> Comparison:
-    """Every metric of every case that both folders have in the table of a study.
+class Shelf:
+    """What a results folder holds of one study, and what is wrong with it, a sentence each."""
 
-    Raises StudyError for a missing folder, a folder without a table, a table without the columns that identify its
-    rows, and two folders without a common case.
+    def __init__(self, root: Path, study: str) -> None:
+        self.study, self.root, self.folder = study, root, root / study
+        self.files = {path.name: path for path in record_files(root, study)}
+        self.timings = {path.name: path for path in sorted(self.folder.glob(f"*{TIMING}*{SUFFIX}"))}
+        self.has_records = bool(self.files) or index_path(root, study).exists()
+        self.machine = machine_of(root, study)
+        self.findings = dict[str, None]()
+        self._references: dict[str, Reference | None] = {}
+
+    @cached_property
+    def table(self) -> dict[Key, Row]:
+        """Rows of its table, empty without one that names recipes. One that cannot be read is a finding, without
+        records a StudyError."""
+        path = self.folder / f"{self.study}.csv"
+        try:
+            table = pd.read_csv(path) if path.is_file() else pd.DataFrame()
+        except (ValueError, OSError) as error:
+            problem = f"{path} cannot be read as a table ({str(error).strip()}); {AGAIN}"
+            if not self.has_records:
+                raise StudyError(problem) from error
+            self.findings[problem], table = None, pd.DataFrame()
+        if not {"scene", "recipe"} <= set(table.columns):
+            return {}
+        for name in [name for name in (*ROW, STATUS, REFERENCE) if name in table.columns]:
+            table[name] = table[name].astype(object).fillna("")
+        return _by_key(((str(row["scene"]), str(row["recipe"])), row) for row in table.to_dict("records"))
+
+    @cached_property
+    def metrics(self) -> set[str]:
+        """Names of those in its table; of all without one."""
+        columns = (METRIC.match(str(column)) for row in self.table.values() for column in row)
+        return {match["name"] for match in columns if match} or {metric.name for metric in METRICS}
+
+    def read(self, file: str) -> Stored | None:
+        """A record; None and a finding where it cannot be read."""
+        record = self._record(self.files[file])
+        if record is None:
+            return None
+        try:
+            return Stored(file, record, case_from_json(record.key))
+        except StudyError:
+            return Stored(file, record, None)
+
+    def _record(self, path: Path | None) -> Record | None:
+        try:
+            return None if path is None else read_record(path)
+        except StudyError as error:
+            self.findings[str(error)] = None
+            return None
+
+    @cached_property
+    def rows(self) -> dict[Key, Row]:
+        """Rows of all its cases: of its records, or of its table where it has none."""
+        if not self.has_records:
+            return self.table
+        stored = [one for file in self.files if (one := self.read(file))]
+        rows = _by_key((one.key, self.row(one, self.metrics)) for one in stored)
+        self.check_table(stored, rows)
+        return rows
+
+    def row(self, stored: Stored, names: Collection[str]) -> Row:
+        """The row of a run in a table of the metrics `names`; empty without a case."""
+        if stored.case is None:
+            return {}
+        times = self._record(self.timings.get(timing_name(stored.file, self.machine or machine_id())))
+        timing = None if times is None else timing_of(times)
+        run = Run(stored.case, stored.record, self._reference(stored.case.scene), timing)
+        return {**row_of(run, [metric for metric in METRICS if metric.name in names])}
+
+    def _reference(self, scene: Scene) -> Reference | None:
+        """None where it cannot be read: its file has a finding of its own, if it is there."""
+        key = scene_to_json(scene)
+        if key not in self._references:
+            try:
+                self._references[key] = reference_for(self.root, scene)
+            except StudyError:
+                self._references[key] = None
+        return self._references[key]
+
+    def check_table(self, stored: Collection[Stored], rows: dict[Key, Row]) -> None:
+        """A finding for rows of its table without a record, and for numbers in it that are not those of `rows`."""
+        keys = {one.key for one in stored}
+        bare = [f"{scene} {recipe}" for scene, recipe in self.table if (scene, recipe.split(NUMBER)[0]) not in keys]
+        if bare and len(stored) == len(self.files) and all(one.case for one in stored):
+            self.find(f"has {len(bare)} rows in its table without a record", bare)
+        pairs = [(self.table[key], row) for key, row in rows.items() if key in self.table and row]
+        changes = [one for pair in pairs for one in row_changes(_named(self.study, pair[1]), *pair)]
+        old = [one for one in changes if not one.is_time and one.verdict in (Verdict.MOVED, Verdict.WITHIN_FLOOR)]
+        if old:
+            self.find(f"has a table that is not of its records; {AGAIN}", [one.metric for one in old])
+
+    def find(self, what: str, names: Iterable[str]) -> None:
+        names = list(dict.fromkeys(names))
+        more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
+        self.findings[f"{self.folder} {what}: {', '.join(names[:NAMED])}{more}"] = None
+
+
+def compare(old: Path | str, new: Path | str) -> Comparison:
+    """Every number of every case that both folders have.
+
+    Raises StudyError for a missing folder, a folder without results, a table that cannot be read, and two folders
+    without a common case.
     """
-    mine, theirs = tables_of(old), tables_of(new)
-    changes, only_old, only_new = list[Change](), 0, 0
-    machines = machine_of(old), machine_of(new)
+    old, new = Path(old), Path(new)
+    mine, theirs = _shelves(old), _shelves(new)
+    changes, findings, only_old, only_new = list[Change](), list[str](), 0, 0
     for study in sorted(set(mine) & set(theirs)):
-        before, after = mine[study], theirs[study]
-        common = [key for key in before if key in after]
-        only_old, only_new = only_old + len(before) - len(common), only_new + len(after) - len(common)
-        same = equal_records(old, new, study)
-        new_changes = [one for key in common for one in changes_of(study, before[key], after[key], key in same)]
-        pair = {machine_of(old, study), machine_of(new, study)}
-        if None in pair or len(pair) > 1:
-            new_changes = [replace(one, verdict=Verdict.OTHER_MACHINE) if one.is_time else one for one in new_changes]
-        changes += new_changes
-    if not changes:
+        one, other = mine[study], theirs[study]
+        recorded = one.has_records and other.has_records
+        found = _by_record(one, other) if recorded else _by_row(one, other)
+        if one.has_records and not other.has_records:
+            other.findings[f"{other.folder} holds a table alone, {one.folder} holds records"] = None
+        if None in (one.machine, other.machine) or one.machine != other.machine:
+            found = [replace(each, verdict=Verdict.OTHER_MACHINE) if each.is_time else each for each in found]
+        keys = [set(shelf.files if recorded else shelf.rows) for shelf in (one, other)]
+        only_old, only_new = only_old + len(keys[0] - keys[1]), only_new + len(keys[1] - keys[0])
+        changes, findings = changes + found, [*findings, *one.findings, *other.findings]
+    lost = [study for study, shelf in mine.items() if shelf.has_records and study not in theirs]
+    findings += [f"{new / study} holds no records, {old / study} does" for study in lost]
+    if not changes and not findings:
         raise StudyError(f"{old} and {new} have no case in common; compare folders in which the same study has run")
-    return Comparison(changes, only_old, only_new, machines)
+    return Comparison(changes, findings, only_old, only_new, (machine_of(old), machine_of(new)))
 
 
-def tables_of(folder: Path) -> dict[str, dict[Key, Row]]:
-    """Name of a study -> its rows by scene and recipe. Raises StudyError as `compare`."""
+def _shelves(folder: Path) -> dict[str, Shelf]:
     if not folder.is_dir():
         raise StudyError(f"there is no folder {folder}")
-    files = {path.parent.name: path for path in sorted(folder.glob("*/*.csv")) if path.stem == path.parent.name}
-    tables = {study: rows for study, path in files.items() if (rows := _read(path))}
-    if not tables:
+    found = {path.name: Shelf(folder, path.name) for path in sorted(folder.iterdir()) if path.is_dir()}
+    held = {study: shelf for study, shelf in found.items() if shelf.has_records or shelf.table}
+    if not held:
         raise StudyError(
-            f"{folder} holds no table of a study whose rows name their recipe; `organbench report --results {folder}` "
-            "writes it from the runs"
+            f"{folder} holds no record, and no table of a study whose rows name their recipe; `organbench run STUDY "
+            f"--results {folder}` makes both"
         )
-    return tables
+    return held
 
 
-def _read(path: Path) -> dict[Key, Row]:
-    try:
-        table = pd.read_csv(path)
-    except (ValueError, OSError) as error:
-        again = "write it again with `organbench report`"
-        raise StudyError(f"{path} cannot be read as a table ({str(error).strip()}); {again}") from error
-    if not {"scene", "recipe"} <= set(table.columns):
-        return {}
-    return {(str(row["scene"]), str(row["recipe"])): row for row in table.to_dict("records")}
+def _by_row(old: Shelf, new: Shelf) -> list[Change]:
+    pairs = [(row, new.rows[key]) for key, row in old.rows.items() if key in new.rows]
+    return [one for row, other in pairs for one in row_changes(_named(old.study, other), row, other)]
 
 
-def changes_of(study: str, old: Row, new: Row, same_bits: bool) -> list[Change]:
-    """Changes of the status of each case and of all its metrics that one of the folders has."""
-    case = Named(study, *(_text(new.get(name, "")) for name in ROW))
-    changes = []
-    if old.get(STATUS) != new.get(STATUS):
-        before, after = str(old.get(STATUS)), str(new.get(STATUS))
-        changes.append(Change(case, STATUS, "", before, after, np.nan, Verdict.MOVED))
-    for column in [column for column in old if column in new]:
-        named = METRIC.match(str(column))
-        before, after = old[column], new[column]
-        if named is None or named["name"] == "dt" or (pd.isna(before) and pd.isna(after)):
-            continue
-        name, unit = named["name"], named["unit"]
-        floor = max(_floor(old, name, unit), _floor(new, name, unit))
-        verdict = verdict_of(float(before), float(after), floor, same_bits)
-        if name in JUDGED and str(old.get(REFERENCE)) != str(new.get(REFERENCE)):
-            verdict = Verdict.OTHER_REFERENCE
-        changes.append(Change(case, name, unit, float(before), float(after), floor, verdict))
+def _by_record(old: Shelf, new: Shelf) -> list[Change]:
+    """Also finds what the new folder lacks. Of equal records the tables are compared too, without their times."""
+    lost = [file for file in old.files if file not in new.files]
+    lost += [file for file in old.timings if file not in new.timings and old.machine == new.machine]
+    if lost:
+        new.find(f"lacks {len(lost)} records that {old.folder} has", lost)
+    changes, shelves = list[Change](), (old, new)
+    before, after = ({file: one for file in shelf.files if (one := shelf.read(file))} for shelf in shelves)
+    moved: tuple[dict[Key, Row], dict[Key, Row]] = ({}, {})
+    for file in [file for file in before if file in after]:
+        one, other = before[file], after[file]
+        same = all(bit.verdict == Verdict.SAME_BITS for bit in record_changes(NOBODY, one.record, other.record))
+        names = TIMES if same else old.metrics | new.metrics
+        row, new_row = old.row(one, names), new.row(other, names)
+        case = _named(old.study, new_row) if new_row else NOBODY._replace(study=old.study, body=other.record.name)
+        changes += [*row_changes(case, row, new_row), *record_changes(case, one.record, other.record, (row, new_row))]
+        if not same:
+            moved[0][one.key], moved[1][other.key] = row, new_row
+    alike = [key for key in old.table if key in new.table and (key[0], key[1].split(NUMBER)[0]) not in moved[1]]
+    for key in alike:
+        of_tables = row_changes(_named(old.study, new.table[key]), old.table[key], new.table[key], same_bits=True)
+        changes += [change for change in of_tables if not change.is_time]
+    old.check_table(before.values(), moved[0])
+    new.check_table(after.values(), moved[1])
     return changes
 
 
-def _text(value: object) -> str:
-    return f"{value:.3g}" if isinstance(value, float) else str(value)
+NOBODY = Named(*[""] * len(Named._fields))
 
 
-def _floor(row: Row, name: str, unit: str) -> float:
-    return float(row.get(f"{name} floor [{unit}]", np.nan))
+def _named(study: str, row: Row) -> Named:
+    return Named(study, *(f"{x:.3g}" if isinstance(x, float) else str(x) for x in (row.get(name, "") for name in ROW)))
 
 
-def equal_records(old: Path, new: Path, study: str) -> set[Key]:
-    """(scene, recipe) of the cases whose records both folders hold, with equal fields. Records that cannot be read, or
-    whose scene no longer exists, count as different."""
-    mine, theirs = ({path.name: path for path in record_files(folder, study)} for folder in (old, new))
-    pairs = set()
-    for name in sorted(set(mine) & set(theirs)):
-        try:
-            records = read_record(mine[name]), read_record(theirs[name])
-            case = case_from_json(records[0].key)
-        except StudyError:
-            continue
-        if _equal(*records):
-            pairs.add((case.scene.name, recipe_text(case)))
-    return pairs
-
-
-def _equal(one: Record, other: Record) -> bool:
-    return set(one.fields) == set(other.fields) and all(
-        np.array_equal(field.values, other.fields[name].values, equal_nan=field.values.dtype.kind == "f")
-        for name, field in one.fields.items()
-    )
-
-
-def labels_of(cases: Iterable[Named]) -> dict[Named, str]:
-    """A label of each case: body, nodes and method, and as many further columns as distinguish the cases of a study and
-    scene."""
-    alike = defaultdict[tuple[str, ...], set[Named]](set)
-    for case in cases:
-        alike[case.study, case.scene, _case_label(case, ())].add(case)
-    labels = dict[Named, str]()
-    for group in alike.values():
-        more = next(one for one in MORE if len({_case_label(case, one) for case in group}) == len(group))
-        labels |= {case: _case_label(case, more) for case in group}
-    return labels
-
-
-def _case_label(case: Named, more: tuple[str, ...]) -> str:
-    words = {"law": case.law, "step": f"step {case.step}", "recipe": case.recipe}
-    return ", ".join(filter(None, [case.body, case.nodes, case.method, *(words[name] for name in more)]))
+def _by_key(rows: Iterable[tuple[Key, Row]]) -> dict[Key, Row]:
+    """Rows by their keys; those of the same key, as of two scenes of one name, are numbered."""
+    rows = list(rows)
+    count, met = Counter(key for key, _ in rows), Counter[Key]()
+    keyed = {}
+    for (scene, recipe), row in rows:
+        met[scene, recipe] += 1
+        number = f"{NUMBER}{met[scene, recipe]}" if count[scene, recipe] > 1 else ""
+        keyed[scene, recipe + number] = row
+    return keyed

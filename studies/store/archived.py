@@ -1,6 +1,5 @@
 """Unpacked archives: results folders that stay as they are, whatever machine and code reads them."""
 
-import json
 from pathlib import Path
 
 from studies.base.errors import StudyError
@@ -21,10 +20,7 @@ def shown_machine(root: Path) -> str:
     """The machine whose frame times tables and charts of a folder show: this one; of an archive the one it names."""
     if not is_archive(root):
         return machine_id()
-    try:
-        machine = machine_of(root)
-    except (OSError, json.JSONDecodeError, AttributeError) as error:
-        raise StudyError(f"{root / 'machine.json'} is damaged ({error}): unpack the archive again") from error
+    machine = machine_of(root)
     if machine is None:
         raise StudyError(f"{root / 'machine.json'} is missing or names no machine: unpack the archive again")
     return machine

@@ -11,6 +11,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from studies.base.atomic import write_whole
+from studies.base.errors import StudyError
 
 PACKAGES = ("numpy", "scipy", "numba", "llvmlite", "scikit-fem", "gmsh", "meshio", "h5py", "pypardiso")
 CPUINFO = Path("/proc/cpuinfo")
@@ -64,10 +65,13 @@ def machine_id() -> str:
 
 def machine_of(folder: Path, study: str = "") -> str | None:
     """The short id of the machine whose results lie in a folder, or that measured one study there where this was
-    another; None where nothing says so."""
+    another; None where nothing says so. Raises StudyError for a damaged file."""
     own = folder / study / "machine.json"
     path = own if own.is_file() else folder / "machine.json"
-    return json.loads(path.read_text(encoding="utf-8")).get("id") if path.is_file() else None
+    try:
+        return json.loads(path.read_text(encoding="utf-8")).get("id") if path.is_file() else None
+    except (OSError, ValueError, AttributeError, RecursionError) as error:
+        raise StudyError(f"{path} is damaged ({error}): draw the report, or unpack the archive, again") from error
 
 
 def write_machine(path: Path) -> None:

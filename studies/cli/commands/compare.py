@@ -9,7 +9,8 @@ from rich.table import Table
 
 from studies.cli.terminal import console, say
 from studies.metrics.cells import MISSING, plain
-from studies.metrics.compare_folders import Change, Comparison, Verdict, labels_of
+from studies.metrics.change import Change, Verdict, labels_of
+from studies.metrics.compare_folders import Comparison
 from studies.metrics.compare_folders import compare as compared
 from studies.store.tables import write_table
 
@@ -25,11 +26,13 @@ def compare(
 ) -> None:
     """Compare two results folders number by number.
 
-    Times are compared only where one machine measured both. A table on a terminal, else Markdown. Exit code 1 where
-    accuracy moved by more than its uncertainty, or times of one machine by more than their spread.
+    Records are compared; tables only where a folder has no records. Times are compared only where one machine measured
+    both. A table on a terminal, else Markdown. Exit code 1 where a record is missing or cannot be read, and where a
+    number moved: an error by more than its uncertainty, a time by more than its spread, any other by more than
+    round-off.
     """
     comparison = compared(old, new)
-    for line in summary(comparison):
+    for line in [*summary(comparison), *comparison.findings]:
         say(line)
     rows = rows_of(comparison.moved[:SHOWN], comparison)
     if rows and console.is_terminal:
@@ -46,7 +49,7 @@ def compare(
         say(f"{left} more have moved; --csv FILE has them all")
     if csv is not None:
         say(f"\nwritten to {write_table(csv, comparison.table())}")
-    raise typer.Exit(1 if comparison.moved else 0)
+    raise typer.Exit(1 if comparison.moved or comparison.findings else 0)
 
 
 def summary(comparison: Comparison) -> list[str]:

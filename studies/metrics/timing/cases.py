@@ -31,7 +31,7 @@ def timing_file(root: Path, study: str, case: Case) -> Path:
 
 
 def timing_of(record: Record) -> FrameTiming:
-    return FrameTiming(record.fields["frame_ns"].values, record.attributes["core"], record.attributes["threads"])
+    return FrameTiming(record.fields["frame_ns"].values, record.attributes.get("core"), record.attributes["threads"])
 
 
 def time_cases(root: Path, study: str, cases: Iterable[Case], on_case: Callable[[str], None]) -> None:

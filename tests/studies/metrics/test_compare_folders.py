@@ -10,10 +10,16 @@ import pytest
 
 from studies.base.errors import StudyError
 from studies.cli.commands.compare import rows_of
-from studies.metrics.compare_folders import ROUND_OFF, Verdict, compare, equal_records, verdict_of
+from studies.metrics.change import ROUND_OFF, Verdict, verdict_of
+from studies.metrics.compare_folders import compare
+from studies.metrics.table import study_table
+from studies.store.ledger import Ledger
+from studies.store.links import link_study
 from studies.store.paths import record_files
 from studies.store.record import read_record, write_record
 from studies.store.tables import write_table
+from studies.sweep.load import load_runs
+from tests.studies.tiny import tiny_study
 
 PUBLISHED = Path(__file__).parents[3] / "results" / "published"
 NAN = float("nan")
@@ -30,6 +36,7 @@ NAN = float("nan")
         (2.0, 2.05, 0.1, True, Verdict.WITHIN_FLOOR),
         (2.0, 2.05, NAN, False, Verdict.NOT_RESOLVABLE),
         (NAN, 2.0, 0.1, False, Verdict.NOT_RESOLVABLE),
+        (2.0, NAN, NAN, False, Verdict.MOVED),
         (0.0, 0.0, NAN, False, Verdict.ROUND_OFF),
     ],
 )
@@ -80,19 +87,89 @@ def test_errors_against_two_references_are_not_judged(tmp_path, old):
     assert Verdict.OTHER_REFERENCE not in verdicts_of(comparison, "min_j")
 
 
-def test_records_are_compared_to_the_last_bit(results, tmp_path):
-    other = tmp_path / "other"
-    shutil.copytree(results, other)
-    before = equal_records(results, other, "tiny")
-    assert len(before) == len(record_files(results, "tiny"))
-    path = record_files(other, "tiny")[0]
+@pytest.fixture
+def drawn(results):
+    """Finished results with their table."""
+    study = tiny_study()
+    runs, _ = load_runs(results, study)
+    link_study(Ledger(results), "tiny")
+    write_table(results / "tiny" / "tiny.csv", study_table(runs, ("volume_worst", "min_j", "step_time")))
+    return results
+
+
+def edited(folder, **changes):
+    """A record of a run with other attributes, or arrays: functions of the stored ones."""
+    path = next(path for path in record_files(folder, "tiny") if read_record(path).status == "ok")
     record = read_record(path)
-    volume = record.fields["volume"]
-    nudged = replace(volume, values=np.nextafter(volume.values, 1.0))
-    write_record(path, replace(record, fields={**record.fields, "volume": nudged}))
-    assert len(equal_records(results, other, "tiny")) == len(before) - 1
-    path.write_bytes(b"cut off")
-    assert len(equal_records(results, other, "tiny")) == len(before) - 1
+    fields = {
+        name: replace(item, values=changes[name](item.values)) if name in changes else item
+        for name, item in record.fields.items()
+    }
+    attributes = {name: changes[name](x) if name in changes else x for name, x in record.attributes.items()}
+    status = changes.get("status", record.status)
+    write_record(path, replace(record, fields=fields, attributes=attributes, status=status))
+
+
+def in_table(folder, column, value):
+    path = folder / "tiny" / "tiny.csv"
+    table = pd.read_csv(path)
+    table[column] = table[column].astype(object)
+    table.loc[table["status"] == "ok", column] = value
+    write_table(path, table)
+
+
+def remove(*paths):
+    for path in paths:
+        path.unlink()
+
+
+PLANTED = {
+    "nothing": (lambda folder: None, None),
+    "the last bit": (lambda folder: edited(folder, volume=lambda v: np.nextafter(v, 1.0)), None),
+    "the tables": (lambda folder: remove(folder / "tiny" / "tiny.csv"), None),
+    "a record is deleted": (lambda folder: remove(record_files(folder, "tiny")[0]), "lacks 1 records"),
+    "all are": (lambda folder: remove(*(folder / "tiny").glob("*.h5")), "holds a table alone"),
+    "all but the index": (lambda folder: remove(*record_files(folder, "tiny")), "rows in its table without a record"),
+    "the study is": (lambda folder: (folder / "tiny").rename(folder / "another"), "holds no records"),
+    "a record is empty": (lambda folder: record_files(folder, "tiny")[0].write_bytes(b""), "was cut off"),
+    "a time is empty": (lambda folder: next(folder.glob("tiny/*.timing.*")).write_bytes(b""), "was cut off"),
+    "the status": (lambda folder: edited(folder, status="inverted"), "status"),
+    "the force": (lambda folder: edited(folder, contact_force=lambda force: 1.1 * force), "contact_force"),
+    "a volume": (lambda folder: edited(folder, volume=lambda volume: 1.001 * volume), "volume_worst"),
+    "the least J": (lambda folder: edited(folder, min_j=lambda j: 0.99 * j), "min_j"),
+    "J is lost": (lambda folder: edited(folder, min_j=lambda j: np.nan * j), "min_j"),
+    "penetration": (lambda folder: edited(folder, penetration=lambda depth: depth + 1e-4), "penetration"),
+    "positions": (lambda folder: edited(folder, snapshots=lambda x: 1.02 * x), "snapshots"),
+    "a count": (lambda folder: edited(folder, springs=lambda count: count + 1), "springs"),
+    "the step": (lambda folder: edited(folder, dt=lambda dt: 1.001 * dt), "dt"),
+    "a number in the table": (lambda folder: in_table(folder, "volume_worst [%]", 99.0), "volume_worst"),
+    "a row in the table": (lambda folder: in_table(folder, "scene", "other"), "without a record"),
+}
+"""What is done to a copy of a folder -> what is said to have moved, or is missing; None: nothing."""
+
+
+@pytest.mark.parametrize("name", PLANTED)
+def test_what_was_done_to_a_folder_is_found(drawn, tmp_path, organbench, name):
+    other = shutil.copytree(drawn, tmp_path / "other")
+    plant, found = PLANTED[name]
+    plant(other)
+    comparison = compare(str(drawn), str(other))
+    said = [*comparison.findings, *(change.metric for change in comparison.moved)]
+    assert any(found in sentence for sentence in said) if found else said == []
+    if name in ("nothing", "a record is deleted"):
+        assert organbench("compare", drawn, other)[0] == (found is not None)
+
+
+def test_a_folder_with_tables_alone_is_compared_with_the_records_of_another(drawn, tmp_path):
+    published = tmp_path / "published"
+    (published / "tiny").mkdir(parents=True)
+    shutil.copy(drawn / "tiny" / "tiny.csv", published / "tiny")
+    comparison = compare(published, drawn)
+    assert comparison.moved == comparison.findings == [] and len(comparison.changes) > 5
+    edited(drawn, min_j=lambda j: 0.99 * j)
+    comparison = compare(published, drawn)
+    assert {change.metric for change in comparison.moved} == {"min_j"}
+    assert "table that is not of its records" in comparison.findings[0]
 
 
 def spoilt(path):
@@ -103,7 +180,7 @@ def spoilt(path):
 
 REFUSED = {
     "there is no folder": lambda path: path / "nowhere",
-    "holds no table of a study": lambda path: folder(path, [{"a": 1}]),
+    "no table of a study": lambda path: folder(path, [{"a": 1}]),
     "have no case in common": lambda path: folder(path, rows(), study="another"),
     "cannot be read as a table": spoilt,
 }
