@@ -60,7 +60,8 @@ def solve_step(system: System, state: State, t: float, load: float, more: np.nda
         loads = loads._replace(guess=guess, face_guess=face_guess, grip=grip)
         x, evaluation = search(system, x, change, loads, before)
         arrived = np.array_equal(x[system.pattern.held], target)
-        off = misplaced(system, x, evaluation)
+        distance, allowed = misplacement(system, x, evaluation)
+        off, last = distance > allowed, evaluation
         if arrived and settled(evaluation, system.settings, LOOSE if off else 1.0):
             if not off:
                 hold = contact.renewed_grip(evaluation.touch, system.sticks, system.surface, x)
@@ -73,9 +74,8 @@ def solve_step(system: System, state: State, t: float, load: float, more: np.nda
             loads = loads._replace(faces=evaluation.faces.pressure)
             evaluation = system.evaluate(x, loads)
         before = evaluation
-    raise StepFailed(
-        f"{system.settings.max_iterations} Newton iterations left a relative force error of {evaluation.errors[0]:.1e}"
-    )
+    failed = unmet(last, system.settings, arrived, distance, allowed)
+    raise StepFailed(f"{system.settings.max_iterations} Newton iterations did not meet: {failed}")
 
 
 def first_guess(system: System, state: State, loads: Loads):
@@ -117,18 +117,29 @@ def settled(evaluation: Evaluation, settings: NewtonSettings, slack: float):
     return evaluation.errors[0] <= slack * settings.force_tol and evaluation.errors[1] <= slack * settings.volume_tol
 
 
-def misplaced(system: System, x: np.ndarray, evaluation: Evaluation):
-    """Whether contact acts farther from an obstacle's surface, or from where it stuck, than its share of the largest
-    displacement."""
-    allowed = system.settings.penetration_tol * np.abs(x[: system.displacement_count]).max()
-    return (
-        max(
-            contact.misplacement(evaluation.touch),
-            contact.slippage(evaluation.touch),
-            misplacement_of_faces(evaluation.faces),
-        )
-        > allowed
+def misplacement(system: System, x: np.ndarray, evaluation: Evaluation) -> tuple[float, float]:
+    """How far contact acts from an obstacle's surface, or from where it stuck, and the share of the largest displacement
+    that is allowed, both [m]."""
+    allowed = system.settings.penetration_tol * float(np.abs(x[: system.displacement_count]).max())
+    touch = evaluation.touch
+    return max(contact.misplacement(touch), contact.slippage(touch), misplacement_of_faces(evaluation.faces)), allowed
+
+
+def unmet(evaluation: Evaluation, settings: NewtonSettings, arrived: bool, distance: float, allowed: float) -> str:
+    """The tests of a step that an iteration did not pass, with their numbers and bounds."""
+    force, volume = evaluation.errors
+    tests = (
+        (force <= settings.force_tol, f"relative force error {force:.1e} (bound {settings.force_tol:g})"),
+        (volume <= settings.volume_tol, f"relative volume error {volume:.1e} (bound {settings.volume_tol:g})"),
+        (arrived, "held nodes are not at their places"),
+        (not contact.mistaken(evaluation.touch), "points that stick to an obstacle are not those that it presses"),
+        (
+            distance <= allowed,
+            f"contact {1e3 * distance:.2g} mm from where it acts (bound {1e3 * allowed:.2g} mm): does an obstacle press "
+            "what is held?",
+        ),
     )
+    return ", ".join(words for met, words in tests if not met)
 
 
 def search(system: System, x: np.ndarray, direction: np.ndarray, loads: Loads, before: Evaluation | None):

@@ -26,6 +26,9 @@ Surface = tuple[np.ndarray, np.ndarray]
 START_DEPTH = 1e-3
 """Depth, over the size of the body, to which an obstacle may start inside the true surface, as in reference_fem.system.
 The run checks the depth in the mesh."""
+LEAST_BULK = 100.0
+"""kappa/mu below which a tissue is refused: there the reference is 0.6 % softer than incompressible tissue, which is
+what every body is (docs/theory.md, eq. 6.14)."""
 MODULUS, DENSITY, DURATION = (100.0, 1e5), (500.0, 2000.0), (1e-3, 1e3)
 """Usual shear moduli [Pa], densities [kg/m³] and durations [s]: from fat to cartilage, from lung to bone."""
 UNUSUAL = 100.0
@@ -46,6 +49,7 @@ def check_scene(scene: Scene) -> list[str]:
     numbers. Makes no mesh; takes a second or two if an obstacle or a held region is to be checked."""
     check_clock(scene)
     _check_names(scene)
+    _check_bulk(scene)
     remarks = [
         *_unusual(scene, "shear modulus", scene.tissue.shear_modulus, MODULUS, "Pa"),
         *_unusual(scene, "density", scene.tissue.density, DENSITY, "kg/m³"),
@@ -71,11 +75,12 @@ def check_scene(scene: Scene) -> list[str]:
         if scene.start is None or not scene.start.shaped:
             _check_start(scene, number, depth_at_start(obstacle, points, triangles, has_wall(scene)), size)
         remarks += _pressed_through(scene, number, points)
-        remarks += _pressed_into_held(scene, number, samples, size)
     for held in scene.held:
         remarks += _too_large(scene, f"the path of region '{held.name}'", _reach(held.path), size)
         _check_region(scene, held.name, held.region.level(points), points, triangles)
     check_cuts(scene, (points, triangles))
+    for number in range(len(scene.obstacles)):
+        _check_clear_of_held(scene, number, samples, size)
     return remarks
 
 
@@ -142,6 +147,18 @@ def _check_names(scene: Scene) -> None:
         )
 
 
+def _check_bulk(scene: Scene) -> None:
+    """Raises StudyError for a tissue that is not nearly incompressible."""
+    ratio = scene.tissue.bulk_over_shear
+    if ratio < LEAST_BULK:
+        poisson = lambda ratio: (3.0 * ratio - 2.0) / (6.0 * ratio + 2.0)  # noqa: E731
+        raise StudyError(
+            f"scene '{scene.name}': the tissue has kappa/mu = {ratio:.3g}, a Poisson ratio of {poisson(ratio):.3g}, and "
+            f"bodies are incompressible: give bulk_over_shear of at least {LEAST_BULK:g} ({poisson(LEAST_BULK):.3g}), "
+            "or leave it out (5,000)"
+        )
+
+
 def _check_lumen(scene: Scene) -> None:
     """Raises StudyError for a lumen in a solid organ. Whether a mesh file is hollow is known when it is meshed."""
     organ = scene.organ
@@ -184,20 +201,21 @@ def _pressed_through(scene: Scene, number: int, points: np.ndarray) -> list[str]
     ]
 
 
-def _pressed_into_held(scene: Scene, number: int, samples: np.ndarray, size: float) -> list[str]:
-    """A warning for an obstacle that moves into a held region, whose nodes cannot move out of its way. The depth is
-    measured at `samples` of the surface (n, 3) [m]; between them it may be larger."""
-    obstacle, warned = scene.obstacles[number], []
+def _check_clear_of_held(scene: Scene, number: int, samples: np.ndarray, size: float) -> None:
+    """Raises StudyError for an obstacle that moves into a held region, whose nodes cannot move out of its way: there is
+    no equilibrium. The depth is measured at `samples` of the surface (n, 3) [m]; between them it may be larger."""
+    obstacle, limit = scene.obstacles[number], START_DEPTH * size
     for held in scene.held:
         nodes = samples[held.region.level(samples) <= 0.0]
-        times = [*np.linspace(0.0, scene.duration, PATH_TIMES), *obstacle.path.times, *held.path.times]
-        deepest = max((-float(obstacle.gap(nodes + held.path(t), t).min()) for t in times if len(nodes)), default=0.0)
-        if deepest > START_DEPTH * size:
-            warned.append(
-                f"scene '{scene.name}': obstacle {number} goes {1e3 * deepest:.2g} mm into held region '{held.name}', "
-                "which cannot give way: elements between them may fold; end its path earlier, or hold less"
+        times = np.unique([*np.linspace(0.0, scene.duration, PATH_TIMES), *obstacle.path.times, *held.path.times])
+        depths = [-float(obstacle.gap(nodes + held.path(t), t).min()) for t in times] if len(nodes) else [0.0]
+        if max(depths) > limit:
+            first = times[np.array(depths) > limit][0]
+            raise StudyError(
+                f"scene '{scene.name}': obstacle {number} goes {1e3 * max(depths):.2g} mm into held region "
+                f"'{held.name}', which cannot give way (more than the {1e3 * limit:.2g} mm allowed from {first:.3g} s "
+                "on): end its path earlier, or hold less"
             )
-    return warned
 
 
 def _unusual(scene: Scene, what: str, value: float, usual: tuple[float, float], unit: str) -> list[str]:

@@ -298,3 +298,19 @@ def test_a_step_that_is_too_long_is_cut():
     even = equilibrium_path(problem, np.arange(1, 11) / 10)[-1]
     assert state.substeps > 1
     np.testing.assert_allclose(state.held_force, even.held_force, atol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("settings", "words", "other"),
+    [
+        ({"force_tol": 1e-30}, r"force error \S+ \(bound 1e-30\)", "volume error"),
+        ({"volume_tol": 1e-30}, r"volume error \S+ \(bound 1e-30\)", "force error"),
+        ({"penetration_tol": 1e-30}, r"contact \S+ mm from where it acts \(bound \S+ mm\)", "volume error"),
+    ],
+)
+def test_a_step_that_fails_names_the_test_that_it_failed(settings, words, other):
+    plane = RigidPlane((0.0, 0.0, 1.0), (0.0, 0.0, -1.0), lambda t: (0.0, 0.0, -t))
+    problem = Problem(ball_octant(3), NeoHookean(1.0, 1000.0), symmetry(), obstacles=[plane])
+    with pytest.raises(SolveError, match=words) as failure:
+        equilibrium_path(problem, [0.05], NewtonSettings(smallest_step=1.0, **settings))
+    assert other not in str(failure.value)

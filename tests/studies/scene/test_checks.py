@@ -57,6 +57,8 @@ BROKEN = {
     "checkpoints is None; give a tuple of times": {"checkpoints": None},
     "checkpoints end at 99.0 s": {"checkpoints": (1.0, 99.0)},
     "shear modulus is 0.0018 Pa, the usual range is 100 to": {"tissue": replace(SOFT, shear_modulus=0.0018)},
+    "kappa/mu = 9.67, a Poisson ratio of 0.45,": {"tissue": replace(SOFT, bulk_over_shear=29 / 3)},
+    "bulk_over_shear of at least 100 (0.495)": {"tissue": replace(SOFT, bulk_over_shear=99.9)},
     "density is 1.06 kg/m³, the usual range is 500": {"tissue": replace(SOFT, density=1.06)},
     "the duration is inf s": {"duration": float("inf")},
     "the duration is nan s": {"duration": float("nan")},
@@ -133,7 +135,7 @@ def test_a_number_that_is_hardly_meant_is_a_warning(words):
     assert words in sentence
 
 
-def test_an_obstacle_that_goes_into_what_is_held_is_a_warning():
+def test_an_obstacle_that_goes_into_what_is_held_is_refused():
     """A ball of radius 50 mm held below z = -45 mm, and a probe that comes from the side at z = -49 mm."""
 
     def warnings_for(held, probe):
@@ -144,7 +146,9 @@ def test_an_obstacle_that_goes_into_what_is_held_is_a_warning():
     probe = Sphere((0.1, 0.0, -0.049), 0.005, path)  # it ends at x = 40 mm, the cap at 21.8 mm
     assert warnings_for(cap, probe) == []
     deeper = replace(probe, path=replace(path, displacements=((0.0, 0.0, 0.0), (-0.083, 0.0, 0.0))))
-    (sentence,) = warnings_for(cap, deeper)
+    with pytest.raises(StudyError) as refusal:
+        warnings_for(cap, deeper)
+    sentence = str(refusal.value)
     deepest = 5.0 - (np.hypot(17.0, 49.0) - 50.0)  # [mm], where it ends, at (17, 0, -49) mm
     assert "into held region 'foot'" in sentence
     assert 0.0 < float(sentence.split("goes ")[1].split(" mm")[0]) == pytest.approx(deepest, abs=0.4)
