@@ -118,8 +118,8 @@ def settled(evaluation: Evaluation, settings: NewtonSettings, slack: float):
 
 
 def misplacement(system: System, x: np.ndarray, evaluation: Evaluation) -> tuple[float, float]:
-    """How far contact acts from an obstacle's surface, or from where it stuck, and the share of the largest displacement
-    that is allowed, both [m]."""
+    """Distance [m] of contact from an obstacle's surface, or from where it stuck; and its bound [m], a share of the
+    largest displacement."""
     allowed = system.settings.penetration_tol * float(np.abs(x[: system.displacement_count]).max())
     touch = evaluation.touch
     return max(contact.misplacement(touch), contact.slippage(touch), misplacement_of_faces(evaluation.faces)), allowed
@@ -135,8 +135,8 @@ def unmet(evaluation: Evaluation, settings: NewtonSettings, arrived: bool, dista
         (not contact.mistaken(evaluation.touch), "points that stick to an obstacle are not those that it presses"),
         (
             distance <= allowed,
-            f"contact {1e3 * distance:.2g} mm from where it acts (bound {1e3 * allowed:.2g} mm): does an obstacle press "
-            "what is held?",
+            f"contact {1e3 * distance:.2g} mm from where it acts (bound {1e3 * allowed:.2g} mm): does an obstacle "
+            "press what is held?",
         ),
     )
     return ", ".join(words for met, words in tests if not met)

@@ -153,9 +153,9 @@ def _check_bulk(scene: Scene) -> None:
     if ratio < LEAST_BULK:
         poisson = lambda ratio: (3.0 * ratio - 2.0) / (6.0 * ratio + 2.0)  # noqa: E731
         raise StudyError(
-            f"scene '{scene.name}': the tissue has kappa/mu = {ratio:.3g}, a Poisson ratio of {poisson(ratio):.3g}, and "
-            f"bodies are incompressible: give bulk_over_shear of at least {LEAST_BULK:g} ({poisson(LEAST_BULK):.3g}), "
-            "or leave it out (5,000)"
+            f"scene '{scene.name}': the tissue has kappa/mu = {ratio:.3g}, a Poisson ratio of {poisson(ratio):.3g}, "
+            f"and bodies are incompressible: give bulk_over_shear of at least {LEAST_BULK:g} "
+            f"({poisson(LEAST_BULK):.3g}), or leave it out (5,000)"
         )
 
 
