@@ -13,5 +13,9 @@ class DamagedFile(StudyError):
     """A stored file does not say what was written."""
 
 
+class OpenElsewhere(StudyError):
+    """A stored file is open for writing in another program."""
+
+
 class OtherVersion(StudyError):
     """A stored file has the layout of another version."""

@@ -8,11 +8,11 @@ from pathlib import Path
 from typing import Any
 from zipfile import is_zipfile
 
-import h5py
 import numpy as np
 import pandas as pd
 
 from studies.base.errors import StudyError
+from studies.base.hdf5 import reading
 from studies.geometry.files.writing import SUFFIX, read_points
 
 DISPLACEMENT = "displacement"
@@ -122,7 +122,7 @@ def _read_csv(path: Path) -> Handed:
 
 
 def _read_vtkhdf(path: Path) -> Handed:
-    with h5py.File(path, "r") as file:
+    with reading(path) as file:
         root: Any = file["VTKHDF"]
         steps = root.get("Steps")
         if steps is None:

@@ -17,6 +17,7 @@ import h5py
 import numpy as np
 
 from studies.base.errors import StudyError
+from studies.base.hdf5 import reading, text_in
 from studies.reference.reference_solves import ReferenceSolve, physics_of, reference_fingerprint, with_floats
 from studies.scene.as_json import scene_to_json
 from studies.scene.library import CUT, JUDGED
@@ -120,7 +121,7 @@ def fingerprint_of(scene: Scene) -> str:
 def record_of(scene: Scene, entry: Entry) -> Record:
     """The published reference as a record of the scene. Raises StudyError for a file that cannot be read."""
     try:
-        with h5py.File(entry.file, "r") as file:
+        with reading(entry.file) as file:
             values = {name: _values(item) for name, item in file.items()}
             attributes = {name: np.asarray(value).item() for name, value in file.attrs.items()}
     except (OSError, KeyError) as error:
@@ -139,6 +140,6 @@ def record_of(scene: Scene, entry: Entry) -> Record:
 
 def _values(dataset: h5py.Dataset) -> np.ndarray:
     if h5py.check_string_dtype(dataset.dtype) is not None:
-        return np.asarray(dataset.asstr()[()]).astype(str)
+        return text_in(dataset)
     values = np.asarray(dataset[()])
     return values.astype({"f": float, "u": np.int64}.get(values.dtype.kind, values.dtype))

@@ -9,9 +9,9 @@ import h5py
 from studies.base.atomic import is_there, sweep_parts, write_whole
 from studies.store.entry import Entry
 from studies.store.ledger import Ledger
-from studies.store.opening import sealed
+from studies.store.opening import INDEX_KIND, sealed
 from studies.store.paths import DIGITS, SUFFIX, TIMING, index_path
-from studies.store.record import INDEX_KIND, SCHEMA
+from studies.store.record import SCHEMA
 
 
 def link_study(ledger: Ledger, study: str) -> list[str]:

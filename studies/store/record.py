@@ -15,14 +15,13 @@ import numpy as np
 
 from studies.base.atomic import write_whole
 from studies.base.errors import DamagedFile, OtherVersion, StudyError
+from studies.base.hdf5 import text_in
 from studies.base.lookup import lookup
 from studies.store.machine import machine_id
-from studies.store.opening import AGAIN, FORMAT, open_results, sealed
+from studies.store.opening import AGAIN, FORMAT, INDEX_KIND, check_not_open, open_results, sealed
 from studies.store.schema import LAYOUTS, FieldSpec, Status, fault
 from studies.store.vtk_group import add_vtk_group
 
-INDEX_KIND = "index"
-"""Of the file that holds links to a study's records and none of their parts."""
 SCHEMA = 2
 """Version of the layout (studies.store.schema); raised when a reader of the old one would misread the new one. 1 had no
 seal."""
@@ -93,12 +92,16 @@ TEXT = h5py.string_dtype()
 HEADER = ("schema", "kind", "key", "name", "status", "message", "fingerprint", "machine")
 
 
-def write_record(path: Path, record: Record) -> None:
+def write_record(path: Path | str, record: Record) -> None:
     """Writes `record` to `path`, whole or not at all (studies.base.atomic). The folder is made when missing.
 
-    Raises StudyError for a record that could not be read back as it is, and when the file cannot be written.
+    Raises StudyError for a record that could not be read back as it is, when the file cannot be written, and when
+    another program has it open for writing.
     """
     _check(record)
+    path = Path(path)
+    if path.is_file():
+        check_not_open(path)
     # Built in memory: a full disk then fails in one plain write, never half-way inside the HDF5 library.
     image = io.BytesIO()
     with h5py.File(image, "w", libver=FORMAT) as file:
@@ -109,7 +112,7 @@ def write_record(path: Path, record: Record) -> None:
         datasets = {name: _add_field(file, name, item) for name, item in record.fields.items()}
         _name_dimensions(file, record.kind, datasets)
         add_vtk_group(file, record.kind, datasets)
-    write_whole(Path(path), sealed(image.getvalue()))
+    write_whole(path, sealed(image.getvalue()))
 
 
 def _add_field(file: h5py.File, name: str, item: Field) -> h5py.Dataset:
@@ -131,13 +134,14 @@ def _name_dimensions(file: h5py.File, kind: str, datasets: Mapping[str, h5py.Dat
             dataset.dims[axis].attach_scale(scales[letter])
 
 
-def read_record(path: Path, fields: Iterable[str] | None = None) -> Record:
+def read_record(path: Path | str, fields: Iterable[str] | None = None) -> Record:
     """The record in `path`, with all fields or only the named ones; with all of them, checked against its
     table (studies.store.schema). The file is opened read-only.
 
-    Raises StudyError when the file is missing, of another program or lacks a named field, DamagedFile when its content
-    is not what was written, OtherVersion for another schema.
+    Raises StudyError when the file is missing, of another program, open for writing in one, or lacks a named field,
+    DamagedFile when its content is not what was written, OtherVersion for another schema.
     """
+    path = Path(path)
     with open_results(path) as file:
         record = _header(path, file)
         stored = {name: item for name, item in file.items() if isinstance(item, h5py.Dataset) and not item.is_scale}
@@ -149,12 +153,12 @@ def read_record(path: Path, fields: Iterable[str] | None = None) -> Record:
     return record
 
 
-def peek(path: Path, attributes: Collection[str] | None = None) -> Record:
+def peek(path: Path | str, attributes: Collection[str] | None = None) -> Record:
     """The record in `path` without its fields: a millisecond, and one for every megabyte. Errors as read_record.
 
     attributes: only these, where they exist, which takes a third of the time for a small file."""
     with open_results(path) as file:
-        return _header(path, file, None if attributes is None else (*HEADER, *attributes))
+        return _header(Path(path), file, None if attributes is None else (*HEADER, *attributes))
 
 
 def canonical(key: str) -> str:
@@ -233,8 +237,5 @@ def _plain(value: Any) -> Any:
 
 
 def _field(path: Path, dataset: h5py.Dataset) -> Field:
-    if dataset.nbytes > path.stat().st_size:  # nothing is compressed
-        raise DamagedFile(f"{path}: {dataset.name!r} claims {dataset.nbytes} bytes, more than the file has: {AGAIN}")
-    text = h5py.check_string_dtype(dataset.dtype) is not None
-    values = np.asarray(dataset.asstr()[()]).astype(str) if text else np.asarray(dataset[()])
+    values = np.asarray(dataset[()]) if h5py.check_string_dtype(dataset.dtype) is None else text_in(dataset)
     return Field(values, str(dataset.attrs["unit"]), str(dataset.attrs["description"]))

@@ -10,9 +10,10 @@ from typing import Any
 import h5py
 import numpy as np
 
+from studies.store.opening import VIEWS
 from studies.store.schema import LAYOUTS
 
-GROUP, GRID = "VTKHDF", np.bytes_("UnstructuredGrid")
+GRID = np.bytes_("UnstructuredGrid")
 VERSION = (2, 0)
 """Of the format: the first with steps."""
 TRIANGLE, TETRAHEDRON = 5, 10
@@ -38,7 +39,7 @@ def add_vtk_group(file: h5py.File, kind: str, fields: Mapping[str, h5py.Dataset]
     seen = SEEN[kind] | {f"FieldData/{name}": name for name in _histories(fields, kind)}
     if not steps:
         seen["Points"] = "rest"
-    root = file.create_group(GROUP)
+    root = file.create_group(VIEWS)
     root.attrs["Version"] = np.array(VERSION, np.int64)
     root.attrs["Type"] = GRID  # of a fixed length, which readers insist on
     root["NumberOfPoints"] = np.array([nodes])

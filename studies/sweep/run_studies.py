@@ -6,9 +6,11 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from studies.base.atomic import write_whole
+from studies.base.errors import OpenElsewhere
 from studies.catalog.study import Study
 from studies.store.archived import check_no_archive
 from studies.store.ledger import Ledger
+from studies.store.opening import check_not_open
 from studies.sweep.executor import CompileListener, Executor, Progress
 from studies.sweep.job import Job, jobs_of
 from studies.sweep.local import Local
@@ -27,11 +29,19 @@ class Failures:
         job.store_failure(cause)
 
     def can_store(self, job: Job) -> bool:
-        """Whether the file of a job can be written; notes a folder in its place as the cause of a failure."""
+        """Whether the file of a job can be written; notes as the cause of a failure that a folder lies in its place, or
+        that another program has it open."""
         path = job.path
         if path.is_dir():
             self.causes[job.label] = f"{path} is a folder where a file belongs: delete it"
-        return not path.is_dir()
+            return False
+        try:
+            if path.is_file():
+                check_not_open(path)
+        except OpenElsewhere as problem:
+            self.causes[job.label] = str(problem)
+            return False
+        return True
 
     def sentence(self, again: str) -> str:
         """All of them in one sentence; again: the command that tries them once more."""

@@ -13,7 +13,8 @@ import numpy as np
 from studies.base.atomic import write_whole
 from studies.base.errors import StudyError
 from studies.report.view.side_by_side import Data, Grid
-from studies.store.vtk_group import GRID, GROUP, VERSION
+from studies.store.opening import VIEWS
+from studies.store.vtk_group import GRID, VERSION
 
 SUFFIX = ".vtkhdf"
 """The one that ParaView knows."""
@@ -32,7 +33,7 @@ def write_grid(path: Path, grid: Grid) -> int:
     check_target(path)
     image = io.BytesIO()
     with h5py.File(image, "w") as file:
-        root = file.create_group(GROUP)
+        root = file.create_group(VIEWS)
         root.attrs["Version"] = np.array(VERSION, np.int64)
         root.attrs["Type"] = GRID
         _geometry(root, grid)

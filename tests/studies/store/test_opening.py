@@ -4,7 +4,7 @@ import h5py
 import numpy as np
 import pytest
 
-from studies.base.errors import DamagedFile, OtherVersion, StudyError
+from studies.base.errors import DamagedFile, OpenElsewhere, OtherVersion, StudyError
 from studies.store import opening
 from studies.store.entry import DAMAGED, read_entry
 from studies.store.opening import open_results, sealed
@@ -122,23 +122,23 @@ def claim(file):
 
 SPOILT = {
     "no field": (lambda file: file.__delitem__("volume"), "lacks 'volume'"),
-    "soft link": (dangle, "lacks 'volume'"),
+    "soft link": (dangle, "/volume is a link"),
     "text": (other_text, "holds 'volume' as <U"),
     "a group": (lambda file: (file.__delitem__("rest"), file.create_group("rest")), "lacks 'rest'"),
     "no unit": (lambda file: file["t"].attrs.__delitem__("unit"), "is cut off or damaged"),
     "no key": (lambda file: file.attrs.__delitem__("key"), "is cut off or damaged"),
-    "more than the file": (claim, "'/t' claims 8000000000000 bytes"),
+    "more than the file": (claim, "/t claims 8,000,000,000,000 bytes"),
     "text for a number": (lambda file: file.attrs.__setitem__("dt_limit", "much"), "has dt_limit = 'much'"),
 }
 
 
 @pytest.mark.parametrize("fault", SPOILT)
-def test_what_no_record_holds_is_damage_under_any_seal(tmp_path, fault):
+def test_what_no_record_holds_is_refused_under_any_seal(tmp_path, fault):
     path, (spoil, sentence) = tmp_path / "a.h5", SPOILT[fault]
     write_record(path, made_up_run.run().record)
     change(path, spoil)
-    with pytest.raises(DamagedFile) as problem:
-        read_record(path)
+    with pytest.raises(StudyError) as problem:
+        read_record(str(path))
     assert sentence in str(problem.value) and str(path) in str(problem.value) and "\n" not in str(problem.value)
 
 
@@ -147,3 +147,16 @@ def test_what_is_changed_through_the_library_is_damage(tmp_path):
     write_record(path, made_up_run.run().record)
     change(path, lambda file: file.attrs.__setitem__("note", "looked at on Monday"), seal=False)
     assert read_entry(path).fault == DAMAGED
+
+
+def test_a_file_that_another_program_has_open_is_that_and_stays(tmp_path):
+    path = tmp_path / "a.h5"
+    write_record(path, record())
+    with h5py.File(path, "r+"):
+        held = path.read_bytes()
+        for touched in (peek, read_record, lambda path: write_record(path, record())):
+            with pytest.raises(OpenElsewhere, match="is open for writing in another program"):
+                touched(path)
+        assert path.read_bytes() == held
+    with pytest.raises(DamagedFile, match="has no checksum any more"):
+        peek(path)

@@ -7,9 +7,9 @@ import h5py
 import numpy as np
 import pytest
 
+from studies.store.opening import VIEWS
 from studies.store.record import Record, write_record
 from studies.store.schema import Status
-from studies.store.vtk_group import GROUP
 from tests.studies.made_up_run import SCENE, run
 from tests.studies.report.view.made import reference_record
 from tests.studies.report.view.test_vtkhdf import exact
@@ -94,7 +94,7 @@ def test_no_number_is_stored_twice(stored):
     record, path = stored
     with h5py.File(path) as file:
         fields, items = [file[name] for name in record.fields], {}
-        file[GROUP].visititems(items.__setitem__)
+        file[VIEWS].visititems(items.__setitem__)
         own = {name: item for name, item in items.items() if isinstance(item, h5py.Dataset) and item not in fields}
         sizes = {name: item.id.get_storage_size() for name, item in own.items()}
     assert sizes.pop("Offsets") < 150
@@ -115,4 +115,4 @@ def test_a_record_without_a_body_has_no_group(tmp_path):
     failed = replace(run(status=Status.FAILED).record, fields={}, attributes={})
     write_record(tmp_path / "a.h5", failed)
     with h5py.File(tmp_path / "a.h5") as file:
-        assert GROUP not in file
+        assert VIEWS not in file
