@@ -83,8 +83,11 @@ def run_of_entry(record: Record, reference: Reference | None) -> Run:
     if attributes.get(ENTRY) is None:
         raise StudyError(f"'{record.name}' is not a result of another program")
     data, seconds = json.loads(record.key), attributes.get(SECONDS)
-    recipe = BODIES[data["body"]["kind"]](int(data["body"]["nodes"]))
-    case = Case(scene_of_key(record.key), recipe, outside(data["method"]["name"]))
+    try:
+        recipe = BODIES[data["body"]["kind"]](int(data["body"]["nodes"]))
+        case = Case(scene_of_key(record.key), recipe, outside(data["method"]["name"]))
+    except (LookupError, TypeError, ValueError) as error:
+        raise StudyError(f"'{record.name}' is not a result of another program ({error})") from error
     timing = None
     if seconds is not None:
         timing = FrameTiming(np.full((1, int(attributes["frames"])), 1e9 * seconds * attributes["frame"]))

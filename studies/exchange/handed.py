@@ -13,6 +13,7 @@ import pandas as pd
 
 from studies.base.errors import StudyError
 from studies.base.hdf5 import reading
+from studies.base.within import file_within
 from studies.geometry.files.writing import SUFFIX, read_points
 
 DISPLACEMENT = "displacement"
@@ -147,7 +148,7 @@ def _read_pvd(path: Path) -> Handed:
     rows = sorted((float(entry.attrib["timestep"]), entry.attrib["file"]) for entry in sets)
     if not rows:
         raise StudyError(f"{path.name} names no files")
-    positions = _of_grids(path.name, [path.parent / name for _, name in rows])
+    positions = _of_grids(path.name, [file_within(path.parent, name, path.name) for _, name in rows])
     return Handed(path.name, np.array([t for t, _ in rows]), positions, {})
 
 

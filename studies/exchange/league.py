@@ -91,9 +91,11 @@ class EntryFile(BaseModel):
 def read_entry_file(path: Path) -> EntryFile:
     """The entry in a file. Raises StudyError for one that cannot be read, that lacks or adds something, and for one
     that hands in metrics."""
+    if not path.is_file():
+        raise StudyError(f"there is no file {path}")
     try:
         data = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         raise StudyError(f"{path.name} cannot be read as an entry ({error})") from error
     if not isinstance(data, dict):
         raise StudyError(f"{path.name} holds no JSON object; docs/league.md lists what an entry needs")

@@ -20,11 +20,13 @@ from studies.metrics.wish import SOLID
 from studies.reference.load import reference_for
 from studies.report.page.markup import ASSETS, TEMPLATES
 from studies.report.page.svg import inline
-from studies.store.record import read_record
+from studies.store.record import json_in, read_record
 from studies.store.schema import COMPARABLE
 from studies.store.tables import write_table
 
 NAME, CHART, TABLE = "league.html", "profiles.png", "league.csv"
+SAID = {"engine", "version", "ours", "scene", "mesh", "nodes", "settings", "evaluations"}
+"""What the file of an entry says, and a row repeats."""
 HEADS = {
     "force_end": "force",
     "mean_error": "displacement, mean",
@@ -81,8 +83,8 @@ def league_rows(root: Path) -> tuple[list[dict[str, Any]], list[str]]:
 def _row(path: Path) -> dict[str, Any]:
     """Raises StudyError for a record that cannot be read or is no entry of the set."""
     record = read_record(path)
-    entry = json.loads(str(record.attributes.get(LEAGUE) or "{}"))
-    if entry.get("scene") not in frozen():
+    entry = json_in(record.attributes.get(LEAGUE) or "{}", f"the entry in {path}")
+    if entry.get("scene") not in frozen() or not set(entry) >= SAID:
         raise StudyError(f"{path} is no entry of the league; delete it")
     scene = run_of_entry(record, None).case.scene
     run = run_of_entry(record, reference_for(path, scene))

@@ -122,7 +122,7 @@ def case_from_json(text: str) -> Case:
             precision=data.get("precision", "float64"),
             recorded=tuple(data.get("recorded", ())),
         )
-    except (json.JSONDecodeError, KeyError, TypeError, ValidationError, StudyError) as error:
+    except (ValueError, LookupError, TypeError, AttributeError, RecursionError) as error:
         raise StudyError(f"the text is not a stored case: {_first_line(error)}") from error
     unread = _unread(data | {"body": {}}, case_to_dict(case))
     if unread:

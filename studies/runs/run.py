@@ -24,7 +24,7 @@ from studies.runs.prepare import Prepared, prepare
 from studies.runs.status import status_of
 from studies.runs.surface_frames import moments, surface_fields
 from studies.runs.user_code import fault_of, files_of
-from studies.store.record import Field, Record, Status, new_fields, new_record, read_record, write_record
+from studies.store.record import Field, Record, Status, json_in, new_fields, new_record, read_record, write_record
 from studies.store.schema import RUN_FIELDS
 
 OWN_FILES = "own_files"
@@ -186,7 +186,7 @@ def _shown(prepared: Prepared, x: np.ndarray) -> dict[str, np.ndarray]:
 
 def own_files_of(record: Record) -> dict[str, str]:
     """The user's files with which a run was made: path -> SHA-256 of the content at that time."""
-    return json.loads(str(record.attributes.get(OWN_FILES) or "{}"))
+    return json_in(record.attributes.get(OWN_FILES) or "{}", f"the list of own files of {record.name}")
 
 
 def replay(path: Path) -> tuple[Record, Record, str | None]:

@@ -228,7 +228,19 @@ def _header(path: Path, file: h5py.File, selection: Collection[str] | None = Non
     values = {name: _plain(attributes[name]) for name in names}
     header = {name: values.pop(name) for name in HEADER}
     header["status"] = Status(lookup(header["status"], [str(status) for status in Status], f"status in {path}"))
+    json_in(header["key"], f"the case in {path}")
     return Record(**header, attributes=values)
+
+
+def json_in(text: Any, what: str) -> dict[str, Any]:
+    """The object that stands in a record as JSON. Raises DamagedFile for any other text."""
+    try:
+        data = json.loads(text)
+        if isinstance(data, dict):
+            return data
+    except (TypeError, ValueError, RecursionError) as problem:
+        raise DamagedFile(f"{what} is no JSON text ({problem}): {AGAIN}") from problem
+    raise DamagedFile(f"{what} is no JSON object: {AGAIN}")
 
 
 def _plain(value: Any) -> Any:

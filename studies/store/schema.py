@@ -7,6 +7,8 @@ from collections.abc import Mapping
 from enum import StrEnum
 from typing import Any
 
+import numpy as np
+
 from studies.store.parts import (
     INDEX,
     NUMBER,
@@ -211,6 +213,13 @@ LAYOUTS: dict[str, tuple[dict[str, FieldSpec], dict[str, AttributeSpec]]] = {
     "timing": (TIMING_FIELDS, TIMING_ATTRIBUTES),
 }
 """Kind of a record -> its fields and attributes. A record of another kind is not checked."""
+NUMBERS_OF = {
+    "run": dict.fromkeys(("triangles", "tetrahedra", "cut_faces", "cut_pairs", "surface_node"), "n"),
+    "reference": {"tetrahedra": "n", "sample_tetrahedra": "b"},
+}
+"""Fields of a record that number other things: the letter of the length of these."""
+FINITE = {"run": ("rest", "mass"), "reference": ("nodes", "sample_points")}
+NOTHING = np.empty(0, int)
 
 
 def fault(kind: str, status: Status, attributes: Mapping[str, Any], fields: Mapping[str, Any]) -> str | None:
@@ -228,4 +237,15 @@ def fault(kind: str, status: Status, attributes: Mapping[str, Any], fields: Mapp
     if unknown:
         return f"holds {unknown[0]!r}, which is not a field of a {kind}"
     lengths = {spec.length: attributes[name] for name, spec in attribute_specs.items() if spec.length}
-    return next(filter(None, (spec.fault(fields, lengths) for spec in field_specs.values())), None)
+    wrong = next(filter(None, (spec.fault(fields, lengths) for spec in field_specs.values())), None)
+    if wrong:
+        return wrong
+    values = {name: np.asarray(item.values) for name, item in fields.items()}
+    for name, letter in NUMBERS_OF.get(kind, {}).items():
+        array = values.get(name, NOTHING)
+        if array.size and not 0 <= int(array.min()) <= int(array.max()) < lengths[letter]:
+            return f"holds {name!r} with numbers of {LENGTHS[letter].partition(';')[0]} that do not exist"
+    whole = [name for name in FINITE.get(kind, ()) if not np.isfinite(values[name]).all()]
+    if kind == "run" and status in COMPARABLE and not (lengths["K"] and np.isfinite(values["snapshots"]).all()):
+        whole.append("snapshots")
+    return f"holds {whole[0]!r} without all its numbers" if whole else None

@@ -6,7 +6,10 @@ import re
 import struct
 import zlib
 from pathlib import Path
+from xml.etree import ElementTree
 from xml.etree.ElementTree import ParseError
+
+import h5py
 
 from studies.base.errors import StudyError
 
@@ -23,7 +26,6 @@ OTHER_KINDS = {
     b"\xff\xd8\xff": "a JPEG picture",
     b"%PDF": "a PDF document",
     b"PK\x03\x04": "a zip archive: unpack it first",
-    b"\x89HDF": "an HDF5 file",
     b"<!DOCTYPE html": "a web page: the download has failed",
     b"<html": "a web page: the download has failed",
     b"version https://git-lfs": "a Git LFS pointer: the file itself was not downloaded",
@@ -74,6 +76,12 @@ def check_promises(path: Path) -> None:
     for start, kind in OTHER_KINDS.items():
         if first.startswith(start.lower()):
             raise unreadable(path, f"it is {kind}")
+    if h5py.is_hdf5(path):  # its signature may stand behind a block of another program
+        raise unreadable(path, "it is an HDF5 file")
+    if suffix in (".xdmf", ".xmf") and any(
+        item.get("Format", "XML") != "XML" for item in ElementTree.parse(path).iter()
+    ):
+        raise unreadable(path, "its numbers are in another file: write a VTU")
     if suffix == ".stl" and not is_ascii_stl(head):
         check_stl(path, head, size)
     if head.startswith(PACKED) and not path.name.lower().endswith((".nii.gz", ".nrrd.gz")):

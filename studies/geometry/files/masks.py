@@ -10,6 +10,7 @@ import numpy as np
 from scipy.ndimage import find_objects, gaussian_filter
 
 from studies.base.errors import StudyError
+from studies.base.within import file_within
 from studies.geometry.files.content import Content
 from studies.geometry.mesh.organ_mesh import signed_volume
 
@@ -152,12 +153,7 @@ def check_data_file(path: Path, header: Mapping[str, Any]) -> None:
     """Raise StudyError if the data lie in another file that is no regular one in the folder of the header."""
     for key in ("data file", "datafile"):
         if key in header:
-            folder, file = path.parent.resolve(), Path(path.parent, header[key]).resolve()
-            if Path(header[key]).is_absolute() or not file.is_relative_to(folder) or not file.is_file():
-                raise StudyError(
-                    f"{path.name}: its data file {header[key]!r} is no file in the folder of the header; put it there, "
-                    "and give its name alone"
-                )
+            file_within(path.parent, header[key], path.name)
 
 
 def stated_unit(words: Iterable[str], path: Path) -> str | None:

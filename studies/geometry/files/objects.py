@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from studies.base.within import file_within
 from studies.geometry.files.content import Content
 
 NONE = np.empty((0, 4), np.int64)
@@ -48,9 +49,16 @@ def read_objects(path: Path) -> Content:
 def scene_of(path: Path) -> Any:
     """The file as a trimesh scene, whose points are neither merged nor reordered."""
     import trimesh  # takes a second to load, and few files need it
+    from trimesh.resolvers import FilePathResolver
+
+    class Beside(FilePathResolver):
+        def get(self, name: str) -> bytes:
+            return file_within(path.parent, name, path.name).read_bytes()
 
     if path.suffix.lower() != ".obj":
-        return trimesh.load_scene(path, process=False)
+        with path.open("rb") as file:
+            kind = path.suffix.lower().removeprefix(".")
+            return trimesh.load_scene(file, file_type=kind, resolver=Beside(str(path)), process=False)
     text = io.BytesIO(counted_from_one(path.read_bytes()))
     return trimesh.load_scene(text, file_type="obj", process=False, skip_materials=True, split_objects=True)
 

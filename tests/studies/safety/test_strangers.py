@@ -1,4 +1,4 @@
-"""HDF5 files of a stranger, sealed or not: nothing outside of them is read, and nothing hangs, crashes or unpacks."""
+"""Files of a stranger, sealed or not: nothing outside of them is read, and nothing hangs, crashes or unpacks."""
 
 import os
 
@@ -8,6 +8,8 @@ import pytest
 
 from studies.base.errors import StudyError
 from studies.exchange.handed import read_handed
+from studies.exchange.league import read_entry_file
+from studies.geometry.files.checked_reading import read_mesh
 from studies.store.opening import VIEWS, sealed
 from studies.store.record import read_record, write_record
 from tests.studies import made_up_run
@@ -120,8 +122,73 @@ def test_neither_does_an_entry(beside, kind):
     assert "\n" not in str(problem.value) and "a.vtkhdf" in str(problem.value)
 
 
-def test_a_pipe_is_no_file(tmp_path):
-    for name, read in (("a.h5", read_record), ("a.vtkhdf", read_handed), ("a.npz", read_handed)):
-        os.mkfifo(tmp_path / name)
+@pytest.mark.parametrize(
+    ("name", "change"),
+    [
+        ("triangles", lambda nodes: nodes + 10**6),
+        ("tetrahedra", lambda nodes: nodes - 5000),
+        ("rest", lambda x: x * np.inf),
+        ("snapshots", lambda x: x * np.nan),
+    ],
+)
+def test_a_record_numbers_what_it_has(tmp_path, name, change):
+    path = tmp_path / "a.h5"
+    write_record(path, made_up_run.run().record)
+    with h5py.File(path, "r+") as file:
+        file[name][...] = change(file[name][()])
+    path.write_bytes(sealed(path.read_bytes()))
+    with pytest.raises(StudyError, match=f"a.h5 holds '{name}'"):
+        read_record(path)
+
+
+@pytest.mark.parametrize("key", ["[1]", "{", '{"a":' * 5000 + "1" + "}" * 5000])
+def test_a_case_is_an_object(tmp_path, key):
+    path = tmp_path / "a.h5"
+    write_record(path, made_up_run.run().record)
+    with h5py.File(path, "r+") as file:
+        file.attrs["key"] = key
+    path.write_bytes(sealed(path.read_bytes()))
+    with pytest.raises(StudyError, match=r"the case in .*a.h5 is no JSON"):
+        read_record(path)
+
+
+@pytest.mark.parametrize("read", [read_record, read_handed, read_entry_file, read_mesh])
+def test_a_pipe_is_no_file(tmp_path, read):
+    for suffix in (".h5", ".vtkhdf", ".npz", ".json", ".stl"):
+        os.mkfifo(tmp_path / f"a{suffix}")
         with pytest.raises(StudyError):
-            read(tmp_path / name)
+            read(tmp_path / f"a{suffix}")
+
+
+GLTF = """{"asset": {"version": "2.0"}, "buffers": [{"uri": "NAME", "byteLength": 36}],
+"bufferViews": [{"buffer": 0, "byteLength": 36}], "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}],
+"accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"}],
+"meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}]}"""
+XDMF = '<Xdmf><Domain><Grid><Geometry><DataItem Format="&#72;DF">NAME:/x</DataItem></Geometry></Grid></Domain></Xdmf>'
+PVD = '<VTKFile><Collection><DataSet timestep="0" file="NAME"/></Collection></VTKFile>'
+NAMING = {"a.gltf": (read_mesh, GLTF), "a.xdmf": (read_mesh, XDMF), "a.pvd": (read_handed, PVD)}
+
+
+@pytest.mark.parametrize("named", ["/etc/passwd", "../secret.bin", "link/secret.bin", "pipe"])
+@pytest.mark.parametrize("file", NAMING)
+def test_a_file_names_files_of_its_folder_alone(beside, file, named):
+    folder, (read, text) = beside / "given", NAMING[file]
+    folder.mkdir()
+    (folder / "link").symlink_to(beside)
+    os.mkfifo(folder / "pipe")
+    (folder / file).write_text(text.replace("NAME", named))
+    with pytest.raises(StudyError, match=r"in the folder of|are in another file"):
+        read(folder / file)
+
+
+def test_an_hdf5_file_behind_other_bytes_is_no_mesh(tmp_path):
+    with h5py.File(tmp_path / "a.h5m", "w", userblock_size=512) as file:
+        file["x"] = 1
+    with pytest.raises(StudyError, match="it is an HDF5 file"):
+        read_mesh(tmp_path / "a.h5m")
+
+
+def test_deep_text_of_an_entry_is_one_sentence(tmp_path):
+    (tmp_path / "a.json").write_text('{"a":' * 5000 + "1" + "}" * 5000)
+    with pytest.raises(StudyError, match="cannot be read as an entry"):
+        read_entry_file(tmp_path / "a.json")
