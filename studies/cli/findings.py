@@ -27,9 +27,9 @@ def show(report: Findings) -> None:
 
 
 def parts_table(parts: list[dict[str, Any]]) -> Table:
-    table = Table("part", "name", "triangles", "size \\[mm]", box=None, title="parts (--part)", title_justify="left")
+    table = Table("part", "name", "cells", "size \\[mm]", box=None, title="parts (--part)", title_justify="left")
     for row in parts[:LISTED]:
-        table.add_row(str(row["number"]), Text(row["name"]), f"{row['triangles']:,}", in_mm(row["size"]))
+        table.add_row(str(row["number"]), Text(row["name"]), f"{row['cells']:,}", in_mm(row["size"]))
     if len(parts) > LISTED:
         table.add_row("…", f"{len(parts) - LISTED} more")
     return table

@@ -4,11 +4,12 @@ file has names, else by connectivity."""
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+import meshio
 import numpy as np
 from scipy.spatial import KDTree
 
 from studies.base.errors import StudyError
-from studies.geometry.mesh.organ_mesh import connected
+from studies.geometry.mesh.organ_mesh import connected, tetrahedron_volumes
 
 WELD = 1e-7
 """Points nearer than this fraction of the diagonal are one point: the single precision of STL files."""
@@ -26,7 +27,7 @@ class Content:
     tetrahedra: shape (k, 4)
     point_data: name -> values, one row per point
     names: names of the parts in the order of the file; empty if it has none
-    part: index into `names` of each triangle, shape (t,); empty if the file has no names
+    part: index into `names` of each cell, shape (t,); empty if the file has no names
     unit: the unit that the header or the format defines, or the usual one of the format; None if it is unknown
     unit_by_custom: whether `unit` is only the usual one of the format, because the header states none
     """
@@ -77,6 +78,59 @@ def check_content(content: Content, name: str) -> Content:
     return content
 
 
+CORNERS = {"triangle": 3, "quad": 4, "tetra": 4, "hexahedron": 8, "wedge": 6, "pyramid": 5}
+"""Corners of a cell by its name in meshio without the number of its nodes: corners come first, then mid-side nodes."""
+SIDES = {
+    "tetra": ((0, 2, 1), (0, 1, 3), (1, 2, 3), (0, 3, 2)),
+    "hexahedron": ((0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7)),
+    "wedge": ((0, 2, 1), (3, 4, 5), (0, 1, 4, 3), (1, 2, 5, 4), (2, 0, 3, 5)),
+    "pyramid": ((0, 3, 2, 1), (0, 1, 4), (1, 2, 4), (2, 3, 4), (3, 0, 4)),
+}
+"""Sides of a solid cell, outward; the fourth corner of the tetrahedron of HAND lies inside of the first three."""
+HAND = {"tetra": (0, 1, 2, 3), "hexahedron": (0, 1, 3, 4), "wedge": (0, 1, 2, 3), "pyramid": (0, 1, 3, 4)}
+FLAT = "its curved sides are read as flat, by their corners"
+
+
+def content_of(raw: meshio.Mesh, name: str) -> tuple[Content, str | None]:
+    """The content of a mesh, and a remark for the user or None. Cells are read by their corners; points and lines are
+    left out; polygons are cut into triangles; of solids that are not all tetrahedra the boundary is taken, and
+    triangles next to solids are left out. Raises StudyError for cells of other kinds."""
+    flat, solid, curved = [np.empty((0, 3), np.int64)], list[tuple[str, np.ndarray]](), False
+    for block in raw.cells:
+        kind, data = block.type.rstrip("0123456789"), np.asarray(block.data).astype(np.int64)
+        if kind in ("vertex", "line"):
+            continue
+        if kind not in CORNERS and kind != "polygon":
+            raise StudyError(f"{name}: cells of kind {block.type!r} are not supported; convert to tetrahedra")
+        corners = data if kind == "polygon" else data[:, : CORNERS[kind]]
+        curved |= corners.shape[1] < data.shape[1]
+        if kind in SIDES:
+            solid.append((kind, corners))
+        else:
+            flat.append(fans(corners))
+    points = np.asarray(raw.points, float)
+    tetrahedra = np.concatenate([np.empty((0, 4), np.int64), *(cells for kind, cells in solid if kind == "tetra")])
+    if any(kind != "tetra" for kind, _ in solid):
+        tetrahedra, flat = tetrahedra[:0], boundary_of(points, solid)
+    data = {key: np.asarray(values) for key, values in raw.point_data.items()}
+    return Content(points, np.concatenate(flat), tetrahedra, data), FLAT if curved else None
+
+
+def boundary_of(points: np.ndarray, solid: list[tuple[str, np.ndarray]]) -> list[np.ndarray]:
+    """Outward triangles (t, 3), in groups, on the sides that only one solid cell has; solid: kinds and corners."""
+    sides: dict[int, list[np.ndarray]] = {3: [], 4: []}
+    for kind, cells in solid:
+        inverted = tetrahedron_volumes(points, cells[:, HAND[kind]]) < 0
+        for side in SIDES[kind]:
+            faces = cells[:, side]
+            sides[len(side)].append(np.where(inverted[:, None], faces[:, ::-1], faces))
+    outer = []
+    for faces in (np.concatenate(group) for group in sides.values() if group):
+        _, first, count = np.unique(np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True)
+        outer.append(fans(faces[first[count == 1]]))
+    return outer
+
+
 def fans(polygons: np.ndarray) -> np.ndarray:
     """Triangles (k (m - 2), 3) of convex polygons (k, m): each polygon becomes a fan from its first corner."""
     corners = polygons.shape[1]
@@ -86,25 +140,23 @@ def fans(polygons: np.ndarray) -> np.ndarray:
 
 
 def parts_in(content: Content, metres: float) -> list[dict[str, Any]]:
-    """Number, name, triangles and sides of the box [m] of each part of a surface, JSON-able; metres: per unit of the
-    file. The triangles are one part if the file has tetrahedra, or if a coordinate is not finite."""
+    """Number, name, number of cells and sides of the box [m] of each part, JSON-able; metres: per unit of the file. All
+    cells are one part if a coordinate is not finite."""
     numbers, names = numbered(content)
     rows = []
     for k in range(int(numbers.max(initial=-1)) + 1):
-        own = content.triangles[numbers == k]
+        own = content.cells[numbers == k]
         size = np.ptp(content.points[np.unique(own)], axis=0) if len(own) else np.zeros(3)
-        row = {"number": k + 1, "name": names[k] if names else "", "triangles": len(own)}
+        row = {"number": k + 1, "name": names[k] if names else "", "cells": len(own)}
         rows.append(row | {"size": [metres * side for side in size.tolist()]})
     return rows
 
 
 def chosen(content: Content, part: str | None, name: str) -> Content:
-    """The content reduced to `part`, given by name or number; None: all of it. Raises StudyError for an unknown part,
-    and for a part of a body of tetrahedra; name: of the file."""
+    """The content reduced to `part`, given by name or number; None: all of it. Raises StudyError for an unknown part;
+    name: of the file."""
     if part is None:
         return content
-    if len(content.tetrahedra):
-        raise StudyError(f"{name} holds one body of tetrahedra and no parts; leave --part out")
     numbers, names = numbered(content)
     count = int(numbers.max(initial=-1)) + 1
     by_number = {str(k + 1): k for k in range(count)}
@@ -112,7 +164,8 @@ def chosen(content: Content, part: str | None, name: str) -> Content:
     number = by_name.get(part.lower(), by_number.get(part))
     if number is None:
         raise StudyError(f"{name} has {listed(names, count)}; there is no {part!r} among them")
-    return replace(content, triangles=content.triangles[numbers == number], names=(), part=numbers[:0])
+    cells = {"tetrahedra" if len(content.tetrahedra) else "triangles": content.cells[numbers == number]}
+    return replace(content, **cells, names=(), part=numbers[:0])
 
 
 def listed(names: tuple[str, ...], count: int) -> str:
@@ -123,18 +176,19 @@ def listed(names: tuple[str, ...], count: int) -> str:
 
 
 def numbered(content: Content) -> tuple[np.ndarray, tuple[str, ...]]:
-    """The number of the part of each triangle from 0, (t,), and the names of the parts; without names the parts are the
+    """The number of the part of each cell from 0, (k,), and the names of the parts; without names the parts are the
     connected ones, the one with the largest box first."""
     if content.names:
         return content.part, content.names
-    finite = np.isfinite(content.points).all()
-    if len(content.tetrahedra) or not len(content.triangles) or not finite:
-        return np.zeros(len(content.triangles), np.int64), ()
-    same = coincident(content.points)[content.triangles]
-    label = connected(np.concatenate([same[:, [0, 1]], same[:, [1, 2]]]), len(content.points))[same[:, 0]]
+    cells = content.cells
+    if not len(cells) or not np.isfinite(content.points).all():
+        return np.zeros(len(cells), np.int64), ()
+    same = coincident(content.points)[cells]
+    pairs = np.concatenate([same[:, k : k + 2] for k in range(cells.shape[1] - 1)])
+    label = connected(pairs, len(content.points))[same[:, 0]]
     kinds, label = np.unique(label, return_inverse=True)
     low, high = np.full((len(kinds), 3), np.inf), np.full((len(kinds), 3), -np.inf)
-    for corner in content.triangles.T:
+    for corner in cells.T:
         np.minimum.at(low, label, content.points[corner])
         np.maximum.at(high, label, content.points[corner])
     rank = np.argsort(np.argsort(-np.linalg.norm(high - low, axis=1), kind="stable"))

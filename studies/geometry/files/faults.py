@@ -3,7 +3,6 @@
 import gzip
 import lzma
 import re
-import struct
 import zlib
 from pathlib import Path
 from xml.etree import ElementTree
@@ -12,13 +11,12 @@ from xml.etree.ElementTree import ParseError
 import h5py
 
 from studies.base.errors import StudyError
+from studies.geometry.files.promises import HEADER, PER_TRIANGLE, is_ascii_stl, stl_triangles
 
-FORMATS = "STL, PLY, OBJ, OFF, VTK, VTU, VTP, MSH, glTF, or a label mask in NIfTI or NRRD"
+FORMATS = "STL, PLY, OBJ, OFF, glTF, VTK, VTU, VTP, MSH, MESH, INP, BDF, SU2, VOL, or a label mask in NIfTI or NRRD"
 """Formats that can be read, for messages."""
 HEAD = 65_536
 """Bytes from the start of a file that are searched for a header."""
-HEADER, PER_TRIANGLE = 84, 50
-"""Bytes of the header of a binary STL, and of each of its triangles."""
 LARGE = 100_000_000
 """Bytes from which on the user is asked first: about two million triangles, which take minutes to check."""
 OTHER_KINDS = {
@@ -55,8 +53,13 @@ PROMISES = {
 """Patterns of headers: kind and number of the elements that follow."""
 LEAST_BYTES = {".vtu": 1e-3, ".vtp": 1e-3}
 """Fewest bytes of an element, because zlib packs up to a thousand to one; 2 in the other formats."""
-ENDS = {".vtu": b"</VTKFile>", ".vtp": b"</VTKFile>", ".msh": b"$EndElements"}
-"""Text near the end of a complete file."""
+ENDS = {
+    ".vtu": (b"<VTKFile", b"</VTKFile>"),
+    ".vtp": (b"<VTKFile", b"</VTKFile>"),
+    ".msh": (b"$MeshFormat", b"$EndElements"),
+    ".stl": (b"solid", b"endsolid"),
+}
+"""Text near the beginning of a file of a format, and near the end of a complete one."""
 
 
 def size_warning(path: Path) -> str | None:
@@ -103,18 +106,17 @@ def check_stl(path: Path, head: bytes, size: int) -> None:
         if not head.lstrip().startswith(b"solid"):
             raise unreadable(path, "it is not an STL file: it is text without facets")
         return
-    count = int.from_bytes(head[80:84], "little")
+    count = stl_triangles(head)
     promised = HEADER + PER_TRIANGLE * count
+    more = size - promised
+    if more >= PER_TRIANGLE and more % PER_TRIANGLE == 0:
+        there = count + more // PER_TRIANGLE
+        raise unreadable(path, f"its header states {count:,} triangles, and {there:,} seem to follow: export it again")
     if HEADER <= size < promised:
         raise StudyError(
             f"{path.name} is cut short: its header promises {count:,} triangles in {promised:,} bytes, "
             f"but it has {size:,}; copy or export it again"
         )
-
-
-def is_ascii_stl(head: bytes) -> bool:
-    """Whether a file with this beginning is a text STL; a binary STL may begin with "solid" as well."""
-    return head.lstrip().startswith(b"solid") and (b"facet" in head or b"endsolid" in head)
 
 
 def unreadable(path: Path, reason: str) -> StudyError:
@@ -126,24 +128,24 @@ def reason_of(path: Path, error: BaseException, output: str) -> str:
     if isinstance(error, PermissionError):
         return "it may not be read: change its permissions"
     with open(path, "rb") as file:
-        is_text_stl = path.suffix.lower() == ".stl" and is_ascii_stl(file.read(HEAD))
-    end = b"endsolid" if is_text_stl else ENDS.get(path.suffix.lower())
-    if end and end not in tail(path):
+        head = file.read(HEAD)
+    is_text_stl = path.suffix.lower() == ".stl" and is_ascii_stl(head)
+    start, end = ENDS.get(path.suffix.lower(), (b"", b""))
+    if start and start in head and (path.suffix.lower() != ".stl" or is_text_stl) and end not in tail(path):
         return "it is cut short: its end is missing"
     comma = comma_of(path.read_bytes()) if is_text_stl else ""
     said = sentence_in(output) or (sentence_in(str(error)) if "ReadError" in type(error).__name__ else "")
     return comma or said or next((words for kinds, words in WORDS if isinstance(error, kinds)), OTHERWISE)
 
 
-OTHERWISE = "its content does not follow its format"
+OTHERWISE = "the readers of its format do not understand it"
 WORDS: tuple[tuple[tuple[type[BaseException], ...], str], ...] = (
     ((MemoryError, OverflowError), "it declares more data than fits into memory"),
     ((UnicodeError,), "it contains binary data where text is expected"),
-    ((ParseError,), "its XML is truncated or damaged"),
-    ((EOFError, struct.error, zlib.error, gzip.BadGzipFile, lzma.LZMAError), "it is cut short, or damaged"),
+    ((ParseError,), "its XML is not well formed"),
+    ((EOFError,), "it is cut short, or damaged"),
+    ((zlib.error, gzip.BadGzipFile, lzma.LZMAError), "its packed data are damaged"),
     ((FileNotFoundError,), "a file that belongs to it is missing from its folder"),
-    ((IndexError, KeyError), "it is truncated or refers to missing data"),
-    ((ValueError, AssertionError), "a number in it is malformed or missing"),
 )
 
 

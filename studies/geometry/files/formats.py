@@ -1,35 +1,79 @@
 """Reads the content of a mesh file of any supported format, or raises an error with the reason.
 
-Adding a format: its ending in `ENDINGS`, its reader in `read`, its name in `FORMATS` (studies.geometry.files.faults).
+Adding a format: its readers in `READERS`, how it counts its cells in studies.geometry.files.promises, and its name in
+`FORMATS` (studies.geometry.files.faults).
 """
 
 import contextlib
 import io
 import tempfile
 import warnings
+from collections.abc import Callable
 from pathlib import Path
 
 import meshio
-import numpy as np
 
 from studies.base.errors import StudyError
-from studies.geometry.files.content import Content, check_content, chosen, fans
+from studies.geometry.files.abaqus import read_abaqus
+from studies.geometry.files.content import Content, check_content, chosen, content_of
 from studies.geometry.files.faults import check_promises, reason_of, unreadable
+from studies.geometry.files.gmsh_reader import read_by_gmsh
 from studies.geometry.files.masks import is_mask, read_mask
-from studies.geometry.files.objects import read_objects
+from studies.geometry.files.objects import read_objects, read_ply
+from studies.geometry.files.promises import cleaned, fluent_cells, promised_cells
 from studies.geometry.files.units import Source
-from studies.geometry.files.vtk_files import as_grid, is_legacy_polydata, read_legacy, with_arrays
+from studies.geometry.files.vtk_files import is_legacy_polydata, read_legacy, read_xml
 
-OBJECTS = (".off", ".obj", ".glb", ".gltf")
-ENDINGS = (*(".stl", ".ply", ".vtk", ".vtp", ".vtu", ".msh", ".nii", ".nii.gz", ".nrrd"), *OBJECTS)
-"""Of the files of a folder that are taken for surfaces; a file that is named may have another one of meshio's."""
+
+def read_by_meshio(path: Path) -> meshio.Mesh:
+    """The mesh of a file. Raises any exception of meshio for a broken one, and ReadError for one of ANSYS Fluent that
+    gives its cells by their faces alone."""
+    kind = {".msh": "gmsh", ".fem": "nastran", ".bdf": "nastran", ".nas": "nastran"}.get(path.suffix)
+    if path.suffix == ".msh" and path.read_bytes().lstrip().startswith(b"("):
+        try:
+            mesh, stated = meshio.read(path, file_format="ansys"), fluent_cells(path.read_bytes())
+            if sum(len(block) for block in mesh.cells) == stated:
+                return mesh
+        except (Exception, SystemExit):
+            pass  # said below
+        raise meshio.ReadError("a mesh of ANSYS Fluent whose cells are given by their faces: save it as VTU")
+    return meshio.read(path, file_format=kind)
+
+
+def read_vtk(path: Path) -> meshio.Mesh:
+    return read_legacy(path) if is_legacy_polydata(path) else meshio.read(path)
+
+
+BOTH = (read_by_meshio, read_by_gmsh)
+READERS: dict[str, tuple[Callable[[Path], meshio.Mesh | Content], ...]] = {
+    ".stl": (read_objects,),
+    ".ply": (read_by_meshio, read_ply),
+    ".off": (read_objects,),
+    ".obj": (read_objects,),
+    ".glb": (read_objects,),
+    ".gltf": (read_objects,),
+    ".vtk": (read_vtk,),
+    ".vtu": (read_xml,),
+    ".vtp": (read_xml,),
+    ".msh": BOTH,
+    ".mesh": BOTH,
+    ".bdf": BOTH,
+    ".fem": (read_by_meshio,),
+    ".nas": BOTH,
+    ".inp": (read_abaqus,),
+    ".su2": (read_by_meshio,),
+    ".vol": (read_by_meshio,),
+}
+"""Ending -> readers, which are tried in turn until one reads as many cells as the file states."""
+ENDINGS = (*READERS, ".nii", ".nii.gz", ".nrrd")
+"""Of the files of a folder that are taken for bodies."""
 
 
 def opened(source: Source) -> Content:
     """The content of a file, or of the part of it that `source` names, in the unit of the file.
 
-    meshio reads STL, PLY, VTK, VTU, MSH and more, trimesh OFF, OBJ and glTF. Warns of an assumed unit and of a label
-    that the image cuts off. Raises StudyError for a file that cannot be read, or that lacks cells or the part.
+    Warns of an assumed unit, of curved cells, and of a label that the image cuts off. Raises StudyError for a file that
+    cannot be read whole, or that lacks cells or the part.
     """
     path = source.path
     if not path.is_file():
@@ -37,9 +81,11 @@ def opened(source: Source) -> Content:
     output = io.StringIO()
     try:
         check_promises(path)
+        if not is_mask(path) and path.suffix.lower() not in READERS:
+            raise unreadable(path, "no reader knows its ending")
         with contextlib.redirect_stdout(output), contextlib.redirect_stderr(output), warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            content, remark = read(path, source.part)
+            content, remark = read_mask(path, source.part) if is_mask(path) else read_whole(path)
     except StudyError:
         raise
     # Readers may raise any exception for a broken file, and meshio may even exit the process.
@@ -57,40 +103,25 @@ def opened(source: Source) -> Content:
     return content if is_mask(path) else chosen(content, source.part, path.name)
 
 
-def read(path: Path, part: str | None) -> tuple[Content, str | None]:
-    """The content of a file, and a remark for the user or None. Raises any exception of the reader."""
+def read_whole(path: Path) -> tuple[Content, str | None]:
+    """All cells of a mesh file, and a remark for the user or None. Raises any exception of the first reader if none of
+    READERS can read it, and ReadError if that reads fewer cells than the file states."""
     suffix = path.suffix.lower()
-    if is_mask(path):
-        return read_mask(path, part)
-    if suffix in OBJECTS:
-        return read_objects(path), None
-    if suffix == ".vtk" and is_legacy_polydata(path):
-        points, triangles = read_legacy(path)
-        return Content(points, triangles, np.empty((0, 4), np.int64)), None
-    if suffix in (".vtp", ".vtu"):
-        data = path.read_bytes()
-        with tempfile.TemporaryDirectory() as folder:
-            grid = Path(folder, "surface.vtu")
-            grid.write_bytes(as_grid(data) if suffix == ".vtp" else with_arrays(data))
-            return content_of(meshio.read(grid), path.name), None
-    return content_of(meshio.read(path), path.name), None
-
-
-def content_of(raw: meshio.Mesh, name: str) -> Content:
-    """Tetrahedra and triangles of a mesh, with polygons cut into triangles; points and lines are left out. Raises
-    StudyError for cells of other kinds."""
-    tetrahedra, triangles = [np.empty((0, 4), np.int64)], [np.empty((0, 3), np.int64)]
-    for block in raw.cells:
-        if block.type in ("vertex", "line"):
-            continue
-        data = np.asarray(block.data).astype(np.int64)
-        if block.type == "tetra":
-            tetrahedra.append(data)
-        elif block.type in ("triangle", "quad", "polygon"):
-            triangles.append(fans(data))
-        else:
-            raise StudyError(
-                f"{name}: cells of kind {block.type!r} are not supported; convert to triangles or tetrahedra"
-            )
-    data = {key: np.asarray(values) for key, values in raw.point_data.items()}
-    return Content(np.asarray(raw.points, float), np.vstack(triangles), np.vstack(tetrahedra), data)
+    data = path.read_bytes()
+    promised = promised_cells(data, suffix)
+    failures: list[BaseException] = []
+    with tempfile.TemporaryDirectory() as folder:
+        # A copy: gmsh would also run commands in a file of options next to it. glTF refers to files in its folder.
+        copy = path if suffix == ".gltf" else Path(folder, "mesh" + suffix)
+        if suffix != ".gltf":
+            copy.write_bytes(cleaned(data, suffix))
+        for reader in READERS[suffix]:
+            try:
+                read = reader(copy)
+                found = len(read.triangles) if isinstance(read, Content) else sum(len(block) for block in read.cells)
+                if found < promised:
+                    raise meshio.ReadError(f"it states {promised:,} cells, and {found:,} can be read")
+                return (read, None) if isinstance(read, Content) else content_of(read, path.name)
+            except (Exception, SystemExit) as error:
+                failures.append(error)
+    raise failures[0]

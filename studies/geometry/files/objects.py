@@ -1,10 +1,12 @@
-"""Files that trimesh reads: OFF, OBJ and glTF (geometry only, no materials or motion), with their named objects."""
+"""Files that trimesh reads: STL, OFF, OBJ and glTF (geometry only, no materials or motion), with their named objects;
+and PLY."""
 
 import io
 import re
 from pathlib import Path
 from typing import Any
 
+import meshio
 import numpy as np
 
 from studies.base.within import file_within
@@ -44,6 +46,18 @@ def read_objects(path: Path) -> Content:
         part=numbers if several else numbers[:0],
         unit="m" if path.suffix.lower() in METRES else None,
     )
+
+
+def read_ply(path: Path) -> meshio.Mesh:
+    """A PLY with edges, texture coordinates or other lists. Raises any exception of trimesh for a broken file."""
+    from trimesh.exchange.ply import load_ply
+
+    read = load_ply(io.BytesIO(path.read_bytes()), fix_texture=False, skip_materials=True)
+    vertex = read["metadata"]["_ply_raw"]["vertex"]
+    data: dict[str, Any] = {
+        name: np.ravel(vertex["data"][name]) for name in vertex["properties"] if name not in ("x", "y", "z")
+    }
+    return meshio.Mesh(read["vertices"], [("triangle", np.asarray(read["faces"]))], data)
 
 
 def scene_of(path: Path) -> Any:

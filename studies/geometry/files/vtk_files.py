@@ -1,19 +1,22 @@
-"""Files of VTK that meshio does not read: legacy surfaces, VTP, and raw appended data of VTU.
+"""Files of VTK that meshio does not read whole: legacy surfaces, and XML.
 
-Legacy surfaces are read here; XML files are converted to a VTU that meshio reads, which knows unstructured grids only
-and confuses arrays that ParaView appends as raw bytes at the end of a file. VTK itself would read all of them, but it
-crashes on some damaged files, and the whole command with it. File formats: The VTK User's Guide, 11th edition, 2010,
-chapter 19.
+meshio reads no VTP, of a VTU the cells of the last piece alone, and confuses arrays that ParaView appends as raw bytes
+at the end of a file. VTK itself would read all of them, but it crashes on some damaged files, and the whole command
+with it. File formats: The VTK User's Guide, 11th edition, 2010, chapter 19.
 """
 
 import base64
+import lzma
 import re
+import zlib
 from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
 
 import meshio
 import numpy as np
 
-from studies.geometry.files.content import fans
+from studies.geometry.files.content import coincident, fans
 
 TYPES = {
     b"float": ">f4",
@@ -22,7 +25,7 @@ TYPES = {
     b"long": ">i8",
     b"short": ">i2",
     b"vtktypeint64": ">i8",
-    b"vtkidtype": ">i8",
+    b"vtkidtype": ">i4",
     b"unsigned_int": ">u4",
     b"unsigned_long": ">u8",
 }
@@ -88,9 +91,9 @@ class Legacy:
         return np.array(tokens[:count], dtype=float).astype(dtype)
 
 
-def read_legacy(path: Path) -> tuple[np.ndarray, Triangles]:
-    """Points (n, 3) and triangles (t, 3) of a legacy file; polygons and strips are cut into triangles. Raises ReadError
-    for a file that is cut short or has numbers of an unknown type."""
+def read_legacy(path: Path) -> meshio.Mesh:
+    """The surface of a legacy file; polygons and strips are cut into triangles. Raises ReadError for a file that is cut
+    short or has numbers of an unknown type."""
     text = Legacy(path.read_bytes())
     points, triangles = np.empty((0, 3)), [np.empty((0, 3), np.int64)]
     while words := text.words():
@@ -103,7 +106,7 @@ def read_legacy(path: Path) -> tuple[np.ndarray, Triangles]:
             sizes, corners = cells(text, int(words[1]), int(words[2]))
             if key in CELLS[2:]:
                 triangles.append(cut(sizes, corners, strips=key == CELLS[3]))
-    return points, np.concatenate(triangles)
+    return meshio.Mesh(points, [("triangle", np.concatenate(triangles))])
 
 
 def cells(text: Legacy, first: int, second: int) -> tuple[np.ndarray, np.ndarray]:
@@ -141,68 +144,130 @@ def cut(sizes: np.ndarray, corners: np.ndarray, strips: bool) -> Triangles:
     return np.concatenate(triangles)
 
 
-POLYGON = 7
-"""Number of this kind of cell in VTK."""
 RAW = re.compile(rb'<AppendedData[^>]*encoding\s*=\s*"raw"[^>]*>\s*_')
-ARRAY = re.compile(rb'<DataArray\b([^>]*?offset\s*=\s*"(\d+)"[^>]*?)(?:/>|>.*?</DataArray>)', re.DOTALL)
+UNPACK = {"": bytes, "vtkZLibDataCompressor": zlib.decompress, "vtkLZMADataCompressor": lzma.decompress}
+KINDS = {1: "vertex", 2: "vertex", 3: "line", 4: "line", 5: "triangle", 7: "polygon", 9: "quad", 10: "tetra"}
+KINDS |= {12: "hexahedron", 13: "wedge", 14: "pyramid", 21: "line", 22: "triangle6", 23: "quad8", 24: "tetra10"}
+KINDS |= {25: "hexahedron20", 26: "wedge15", 27: "pyramid13", 28: "quad9", 29: "hexahedron27", 34: "triangle7"}
+"""Number of a kind of cell in VTK -> its name in meshio."""
+GHOST = "vtkGhostType"
+"""Cell data above 0 at cells that another piece owns."""
 
 
-def as_grid(data: bytes) -> bytes:
-    """The bytes of a VTP file as those of a VTU file. Raises ReadError for triangle strips."""
-    data = re.sub(rb"<Piece\b.*?</Piece>", lambda match: as_cells(match[0]), with_arrays(data), flags=re.DOTALL)
-    return data.replace(b"PolyData", b"UnstructuredGrid")
-
-
-def as_cells(piece: bytes) -> bytes:
-    """A piece of a VTP file with its polygons as cells. Raises ReadError for triangle strips."""
-    for kind in (b"Strips", b"Verts", b"Lines"):
-        counts = re.findall(rb'NumberOf%s\s*=\s*"(\d+)"' % kind, piece)
-        if kind == b"Strips" and any(int(count) for count in counts):
-            raise meshio.ReadError("it holds triangle strips; triangulate the surface")
-        piece = re.sub(rb"<%s>.*?</%s>|<%s\s*/>" % (kind, kind, kind), b"", piece, flags=re.DOTALL)
-        piece = re.sub(rb'\s*NumberOf%s\s*=\s*"\d+"' % kind, b"", piece)
-    count = re.search(rb'NumberOfPolys\s*=\s*"(\d+)"', piece)
-    types = f"{POLYGON} " * int(count[1] if count else 0)
-    types_array = f'<DataArray type="UInt8" Name="types" format="ascii">{types}</DataArray>'.encode()
-    piece = piece.replace(b"<Polys>", b"<Cells>").replace(b"</Polys>", types_array + b"</Cells>")
-    return piece.replace(b"NumberOfPolys", b"NumberOfCells")
-
-
-def with_arrays(data: bytes) -> bytes:
-    """The file with its raw appended arrays inline in base64; unchanged if it has none. Raises ReadError if it is cut
-    short."""
+def read_xml(path: Path) -> meshio.Mesh:
+    """All pieces of a VTU or VTP file. Raises ReadError for arrays that are missing, cut short, or packed by a library
+    that Python lacks, and for kinds of cells that are not known."""
+    data = path.read_bytes()
     raw = RAW.search(data)
-    if raw is None:
-        return data
-    text, blob = data[: raw.start()], data[raw.end() :]
-    order = ">" if b'byte_order="BigEndian"' in text else "<"
-    size = np.dtype(order + ("u8" if b'header_type="UInt64"' in text else "u4"))
-    packed = b"compressor=" in text
+    text = data if raw is None else data[: raw.start()] + b"</VTKFile>"
+    root = ElementTree.fromstring(text)
+    arrays = Arrays(root, b"" if raw is None else data[raw.end() :])
+    points, point_data, cells, before = [np.empty((0, 3))], list[dict[str, np.ndarray]](), list[Any](), 0
+    for piece in root.iter("Piece"):
+        points.append(arrays.in_(piece, "Points", None).reshape(-1, 3).astype(float))
+        if len(points[-1]) != int(piece.get("NumberOfPoints", 0)):
+            raise meshio.ReadError("the points of a piece are not as many as it states")
+        names = [array.get("Name", "") for array in piece.iterfind("PointData/DataArray")]
+        point_data.append({name: arrays.in_(piece, "PointData", name) for name in names})
+        cells += [(kind, rows + before) for kind, rows in piece_cells(arrays, piece)]
+        before += len(points[-1])
+    shared = set.intersection(*map(set, point_data)) if point_data else set()
+    places = np.concatenate(points)
+    # Pieces repeat the points along which they meet.
+    first = coincident(places) if len(point_data) > 1 else np.arange(before)
+    kept, joined = np.unique(first, return_inverse=True)
+    fields: dict[str, Any] = {name: np.concatenate([data[name] for data in point_data])[kept] for name in shared}
+    return meshio.Mesh(places[kept], [(kind, joined[rows]) for kind, rows in cells], fields)
 
-    def inline(match: re.Match[bytes]) -> bytes:
-        head, body = block(blob, int(match[2]), size, packed)
-        content = base64.b64encode(head) + base64.b64encode(body) if packed else base64.b64encode(head + body)
-        attributes = re.sub(rb'offset\s*=\s*"\d+"', b"", match[1]).replace(b'"appended"', b'"binary"')
-        return b"<DataArray" + attributes + b">" + content + b"</DataArray>"
 
-    return ARRAY.sub(inline, text) + b"</VTKFile>\n"
+def piece_cells(arrays: "Arrays", piece: ElementTree.Element) -> list[tuple[str, np.ndarray]]:
+    """Kind and corners of the cells of a piece, without those that another piece owns."""
+    found = list[tuple[str, np.ndarray]]()
+    for group, number in (("Cells", None), ("Polys", 7), ("Strips", 6)):
+        count = int(piece.get(f"NumberOf{group}", 0))
+        if not count:
+            continue
+        ends = arrays.in_(piece, group, "offsets").astype(np.int64)
+        corners = arrays.in_(piece, group, "connectivity").astype(np.int64)
+        kinds = np.full(count, number) if number else arrays.in_(piece, group, "types").astype(int)
+        if len(ends) != count or len(kinds) != count or ends[-1] != len(corners):
+            raise meshio.ReadError("the cells of a piece are not as many as it states")
+        sizes = np.diff(ends, prepend=0)
+        ghosts = piece.find(f"CellData/DataArray[@Name='{GHOST}']")
+        own = np.ones(count, bool) if ghosts is None else arrays.numbers(ghosts)[:count] == 0
+        for kind, size in np.unique(np.stack([kinds[own], sizes[own]]), axis=1).T:
+            chosen = own & (kinds == kind) & (sizes == size)
+            rows = corners[(ends - sizes)[chosen][:, None] + np.arange(size)]
+            if kind == 6:
+                found.append(("triangle", cut(np.full(len(rows), size), rows.ravel(), strips=True)))
+            elif int(kind) in KINDS:
+                found.append((KINDS[int(kind)], rows))
+            else:
+                raise meshio.ReadError(f"cells of VTK's kind {kind} are not known; convert to tetrahedra")
+    return found
 
 
-def block(blob: bytes, at: int, size: np.dtype, packed: bool) -> tuple[bytes, bytes]:
-    """Header and body of the array at byte `at` of the appended data `blob`. The header is the length of the array, or
-    of a packed one the number and the lengths of its blocks, as numbers of the type `size`. Raises ReadError if the
-    file ends before."""
+class Arrays:
+    """Reads the arrays of a VTK file in XML."""
 
-    def number(k: int) -> int:
-        values = blob[at + k * size.itemsize : at + (k + 1) * size.itemsize]
-        if len(values) < size.itemsize:
-            raise meshio.ReadError("it is cut short: arrays are missing at its end")
-        return int(np.frombuffer(values, size)[0])
+    def __init__(self, root: ElementTree.Element, raw: bytes):
+        """raw: the bytes of AppendedData of encoding "raw" behind their underscore."""
+        self.raw, self.packing = raw, root.get("compressor", "")
+        self.order = ">" if root.get("byte_order") == "BigEndian" else "<"
+        self.size = np.dtype(self.order + ("u8" if root.get("header_type") == "UInt64" else "u4"))
+        appended = root.find("AppendedData")
+        self.coded = b"" if appended is None else (appended.text or "").strip().removeprefix("_").encode()
+        if self.packing not in UNPACK:
+            raise meshio.ReadError(f"its arrays are packed by {self.packing}; save it with ZLib or without compression")
 
-    count = number(0)
-    words = 3 + count if packed else 1
-    length = sum(number(3 + k) for k in range(count)) if packed else count
-    start = at + words * size.itemsize
-    if len(blob) < start + length:
-        raise meshio.ReadError("it is cut short: arrays are missing at its end")
-    return blob[at:start], blob[start : start + length]
+    def in_(self, piece: ElementTree.Element, group: str, name: str | None) -> np.ndarray:
+        """The array of a group of a piece by its name (None: the only one)."""
+        array = piece.find(f"{group}/DataArray" + (f"[@Name='{name}']" if name else ""))
+        if array is None:
+            raise meshio.ReadError(f"the array {name or ''} of {group} is missing")
+        return self.numbers(array)
+
+    def numbers(self, array: ElementTree.Element) -> np.ndarray:
+        kind, form = array.get("type", ""), array.get("format")
+        dtype = np.dtype(kind.lower()) if re.fullmatch(r"U?Int(8|16|32|64)|Float(32|64)", kind) else None
+        if dtype is None:
+            raise meshio.ReadError(f"numbers of type {kind} are not known")
+        if form == "ascii":
+            return np.array((array.text or "").split(), float if dtype.kind == "f" else int).astype(dtype)
+        inline = "".join((array.text or "").split()).encode()
+        stored = inline if form != "appended" else (self.raw or self.coded)[int(array.get("offset", 0)) :]
+        content = self.content(stored, coded=form != "appended" or not self.raw)
+        return np.frombuffer(content, np.dtype(self.order + dtype.str[1:])).astype(dtype)
+
+    def content(self, stored: bytes, coded: bool) -> bytes:
+        """The bytes of the array at the beginning of `stored`, which is base64 if `coded`: behind their number, or
+        packed in blocks behind the number, two sizes and the packed sizes of the blocks."""
+        width = self.size.itemsize
+
+        def head(words: int) -> np.ndarray:
+            return np.frombuffer(taken(stored, words * width, coded), self.size)
+
+        count = int(head(1)[0])
+        if not self.packing:
+            start = length_of(width, coded)
+            if coded and b"=" not in stored[:start]:  # header and data are coded as one
+                return taken(stored, width + count, coded)[width:]
+            return taken(stored[start:], count, coded)
+        sizes = head(3 + count)[3:].astype(int)
+        blocks = taken(stored[length_of((3 + count) * width, coded) :], int(sizes.sum()), coded)
+        ends = np.cumsum(sizes)
+        return b"".join(UNPACK[self.packing](blocks[end - size : end]) for size, end in zip(sizes, ends, strict=True))
+
+
+def length_of(count: int, coded: bool) -> int:
+    """Number of bytes in which `count` bytes are stored."""
+    return -(-count // 3) * 4 if coded else count
+
+
+def taken(stored: bytes, count: int, coded: bool) -> bytes:
+    """The first `count` bytes. Raises ReadError if there are fewer."""
+    part = stored[: length_of(count, coded)]
+    content = (base64.b64decode(part) if coded else part)[:count]
+    if len(content) < count:
+        raise meshio.ReadError("it is cut short: numbers of an array are missing")
+    return content

@@ -63,7 +63,7 @@ def test_gltf_parts_are_listed_and_chosen_where_the_file_puts_them(tmp_path):
         assert mesh.volume == pytest.approx(1e-9 * scale**3 * VOLUME, rel=1e-5)
         np.testing.assert_allclose(1e3 * mesh.points.mean(axis=0), middle, atol=1e-4)
     rows = examine(Source(path, "mm")).measures["part_list"]
-    assert [(row["number"], row["name"], row["triangles"]) for row in rows] == [
+    assert [(row["number"], row["name"], row["cells"]) for row in rows] == [
         (1, "capsule", len(FACES)),
         (2, "tissue", len(FACES)),
     ]
