@@ -15,7 +15,7 @@ from studies.scene.chosen_place import DEPTH, RADIUS
 from studies.scene.kind import has_wall
 from studies.scene.placing import along, press_times, scaled
 from studies.scene.proposal import Proposal, proposal
-from studies.scene.scene import ForceOutput, Held, Organ, ReferencePlan, Scene
+from studies.scene.scene import ForceOutput, Held, Lumen, Organ, ReferencePlan, Scene
 from studies.scene.scene_file import python_name
 from studies.scene.tissues import LIVER, Tissue
 from studies.store.paths import readable
@@ -71,17 +71,24 @@ def _placed(path: Path, unit: str | None, name: str) -> Placed:
     return Placed(path, scene, tuple(str(warning.message) for warning in remarks))
 
 
-def placed_scene(name: str, source: Source, placing: Proposal, tissue: Tissue = LIVER) -> Scene:
-    """The scene of a body from a file: held at an end, palpated as proposed by a probe in proportion to its size."""
+def placed_scene(
+    name: str, source: Source, placing: Proposal, tissue: Tissue = LIVER, wall: float | None = None
+) -> Scene:
+    """The scene of a body from a file: held at an end, palpated as proposed by a probe in proportion to its size.
+
+    wall: thickness [m] of the wall of a hollow organ, whose content is closed.
+    """
     radius, depth = (round(share * placing.sides[0], 4) for share in (RADIUS, DEPTH))
     point, outward, end = placing.palpation.point, placing.palpation.normal, PRESSED * DURATION
     inward = scaled(outward, -1.0)
     path = Trajectory((0.0, end), ((0.0, 0.0, 0.0), scaled(inward, depth + GAP)))
     pressed = f"a probe of {1e3 * radius:.3g} mm radius pushed in by {1e3 * depth:.3g} mm"
+    given = {"path": str(source.path), "unit": source.unit, "remesh": True}
     return Scene(
         name=name,
         title=f"{name}: held at {placing.held_where}, {pressed}",
-        organ=Organ("file", {"path": str(source.path), "unit": source.unit, "remesh": True}),
+        organ=Organ("file", given if wall is None else given | {"wall": wall}),
+        lumen=None if wall is None else Lumen(),
         tissue=tissue,
         duration=DURATION,
         frames=FRAMES,

@@ -44,10 +44,11 @@ def rows_of(m: dict[str, Any]) -> list[tuple[str, str]]:
     if m["bad_points"]:
         return [("points", f"{m['points_in_file']:,}")]
     cells = f", {m['tetrahedra']:,} tetrahedra" if "tetrahedra" in m else ""
+    lumen = f" round a lumen of {1e6 * m['lumen_volume']:.4g} mL" if m["lumens"] else ""
     rows = [
         ("holds", f"{m['nodes']:,} nodes, {m['triangles']:,} triangles{cells}"),
         ("size", f"{in_mm(m['size'])} mm"),
-        ("volume, area", f"{1e6 * m['volume']:.4g} mL, {1e4 * m['area']:.4g} cm2"),
+        ("volume, area", f"{1e6 * m['volume']:.4g} mL{lumen}, {1e4 * m['area']:.4g} cm2"),
         ("closed, manifold, oriented", ", ".join("yes" if m[k] else "no" for k in ("closed", "manifold", "oriented"))),
         ("parts, lumens, handles", f"{m['parts']}, {m['lumens']}, {'-' if m['genus'] is None else m['genus']}"),
     ]

@@ -29,7 +29,7 @@ def source_of(path: Path, unit: str | None, scale: float, longest_side: str | No
 
 
 def in_metres(millimetres: float | None) -> float | None:
-    return None if millimetres is None else millimetres * MM
+    return None if millimetres is None else millimetres / 1e3  # 6.2 * 1e-3 is 0.006200000000000001
 
 
 def ask_before_large(path: Path, yes: bool) -> None:

@@ -42,7 +42,7 @@ SCENE = Scene(
         ),
     ),
     held=(Held("end", {hold}),),
-    probed=ForceOutput("obstacle", 0, INWARD),
+{lumen}    probed=ForceOutput("obstacle", 0, INWARD),
     damping=8.0,
     reference=ReferencePlan(),
 )
@@ -100,7 +100,8 @@ def scene_text(
     given = {key: json.dumps(value) if isinstance(value, str) else repr(value) for key, value in organ.items()}
     entries = ", ".join(f'"{key}": {text}' for key, text in (given | {"path": "str(FILE)"}).items())
     radius, depth = (round(share * proposal.sides[0], 4) for share in (RADIUS, DEPTH))
-    second, bodies = "", {"TetrahedralBody"}
+    second, hollow = "", "wall" in organ
+    bodies = {"TetrahedralBody"} | ({"Lumen"} if hollow else set())
     if recommended is not None:
         names = " and ".join(recommended.alike)
         bodies.add(recommended.body.split("(")[0])
@@ -118,6 +119,7 @@ def scene_text(
         depth_mm=1e3 * depth,
         organ=entries,
         tissue=tissue.upper(),
+        lumen="    lumen=Lumen(),  # a closed content, which keeps its volume\n" * hollow,
         region=type(proposal.hold).__name__,
         hold=", ".join(str(value) for value in vars(proposal.hold).values()).join(
             (f"{type(proposal.hold).__name__}(", ")")
@@ -133,7 +135,8 @@ def organ_options(source: Source, how: Mapping[str, object]) -> dict[str, object
     studies.geometry.api.scans.Remeshing."""
     given = {"path": str(source.path), "unit": source.unit, "scale": None if source.scale == 1.0 else source.scale}
     given |= {"longest_side": source.longest_side, "part": source.part, "remesh": True}
-    return {key: value for key, value in (given | dict(how)).items() if value not in (None, False, 0.0)}
+    given |= {key: value for key, value in how.items() if key != "smooth" or value}
+    return {key: value for key, value in given.items() if value is not None and value is not False}
 
 
 def file_in_python(path: Path, folder: Path) -> str:

@@ -109,7 +109,7 @@ def mesh(
         made = make(nodes)
     with working("writing"):
         write_mesh(made.mesh, output, write_unit, made.curved)
-    for line in nearness(made.mesh):
+    for line in nearness(made):
         say(line)
     if source is None:
         say(closeness(made, Organ(name, made.mesh.recipe["parameters"]), make))
@@ -211,18 +211,23 @@ def closeness(made: Made, truth: Organ, make: Callable[[int | None], Made]) -> s
     return f"{sentence}; {count:,} nodes do not keep it {bounds} either"
 
 
-def nearness(made: OrganMesh) -> list[str]:
+def nearness(made: Made) -> list[str]:
     """How near a mesh is to its file, a line for each direction and one for the volume; none for other meshes."""
-    lost = made.losses
+    lost = made.mesh.losses
     if not lost:
         return []
     rows = []
-    for key, way in (("file_to_mesh", "file to mesh"), ("mesh_to_file", "mesh to file")):
+    ways = {"file_to_mesh": "file to mesh", "mesh_to_file": "mesh to file", "lumen": "lumen of the file to the mesh's"}
+    for key, way in ways.items():
+        if key not in lost:
+            continue
         mean, most, far = (1e3 * lost[key][kind] for kind in ("mean", "p95", "max"))
         where = ", ".join(f"{1e3 * x:.4g}" for x in lost[key]["where"])
         largest = f"largest {far:.3g} mm ({0.1 * far / lost['diagonal']:.2g} % of the diagonal) at ({where}) mm"
         rows.append(f"{way}: mean {mean:.2g} mm, 95 % within {most:.2g} mm, {largest}")
     before, after = lost["volume_file"], lost["volume_mesh"]
+    if "lumen" in lost and made.curved is not None:
+        after = made.curved.volume
     change = 100 * (after / before - 1)
     return [*rows, f"volume: file {1e6 * before:.5g} mL, mesh {1e6 * after:.5g} mL ({change:+.3f} %)"]
 

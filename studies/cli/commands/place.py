@@ -42,6 +42,7 @@ def place(
     nodes: Annotated[int, typer.Option(help="surface nodes of the body with one volume")] = NODES,
     smooth: Annotated[float, typer.Option(help="close folds and level bumps of this size in mm")] = 0.0,
     solid: Annotated[float | None, typer.Option(help="fill a shell, close openings up to this size in mm")] = None,
+    wall: Annotated[float | None, typer.Option(help="wall thickness of a hollow organ in mm")] = None,
     close_holes: Annotated[bool, typer.Option("--close-holes", help="close holes with flat lids")] = False,
     unit: Unit = None,
     scale: Scale = 1.0,
@@ -59,7 +60,8 @@ def place(
         lookup(tissue, TISSUES, "tissue")
     name = tissue or tissue_named(" ".join([stem_of(path), *([part] if part else [])]))
     source = settled(source_of(path, unit, scale, longest_side, part), yes)
-    how: dict[str, Any] = {"smooth": smooth * MM, "holes": close_holes, "solid": in_metres(solid)}
+    how: dict[str, Any] = {"smooth": smooth * MM, "holes": close_holes}
+    how |= {"solid": in_metres(solid), "wall": in_metres(wall)}
     with working(f"meshing {path.name}"):
         mesh = scan(source, nodes, fill=False, **how)
     if source.longest_side is None:
@@ -70,7 +72,8 @@ def place(
     say(f"  source: {TISSUES[name].source}")
     for line in lines_of(placing):
         say(line)
-    scene, body, seconds = placed_scene(python_name(stem_of(path)), source, placing, TISSUES[name]), None, MESHING
+    scene = placed_scene(python_name(stem_of(path)), source, placing, TISSUES[name], how["wall"])
+    body, seconds = None, MESHING
     try:
         answer = advise(scene, results=shipped(), timing=False)
     except StudyError as error:

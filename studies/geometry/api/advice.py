@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 from studies.base.errors import StudyError
-from studies.geometry.api.scans import scan
+from studies.geometry.api.scans import scan, wall_of
 from studies.geometry.doctor.examine import Findings, examine
 from studies.geometry.doctor.findings import COMMAND, TRY
 from studies.geometry.files.units import Source, likely_units, stem_of
@@ -32,10 +32,9 @@ def with_command(source: Source, diagnosis: Findings) -> Findings:
         return diagnosis
     if source.unit is None and not diagnosis.measures["unit_said"]:
         source = replace(source, unit=diagnosis.measures["unit"])
-    works, attempts = None, dict[str, Findings | None]()
-    measures = diagnosis.measures
+    works, attempts, measures = None, dict[str, Findings | None](), diagnosis.measures
     if not codes & BEYOND and measures["triangles"] <= MOST and likely_units(max(measures["size"])):
-        for how in ways(codes):
+        for how in ways(codes, wall_of(source) if measures["lumens"] else None):
             body = attempts[options(how)] = examined(source, how)
             if body is not None and body.clean:
                 works = how
@@ -63,9 +62,14 @@ def marked(mend: str, works: bool, attempts: Mapping[str, Findings | None]) -> s
     return f"{words}; {name} makes a body, in which this is left: {left}"
 
 
-def ways(codes: set[str]) -> Iterator[dict[str, Any]]:
-    """Arguments of `scan` that may repair these findings, the gentlest first."""
+def ways(codes: set[str], wall: float | None) -> Iterator[dict[str, Any]]:
+    """Arguments of `scan` that may repair these findings, the gentlest first; wall: [m] of a hollow body, which none
+    may fill."""
     lids: dict[str, Any] = {"holes": True} if "open" in codes else {}
+    if wall is not None:
+        yield lids | {"wall": wall}
+        yield lids | {"wall": wall, "smooth": FOLDS}
+        return
     if "shell" not in codes:
         if "handles" not in codes:
             yield lids
@@ -87,7 +91,7 @@ def examined(source: Source, how: dict[str, Any]) -> Findings | None:
 
 def options(how: dict[str, Any]) -> str:
     """These arguments as options of the mesh command."""
-    given = [f"--{key} {1e3 * how[key]:g}" for key in ("smooth", "solid") if key in how]
+    given = [f"--{key} {1e3 * how[key]:g}" for key in ("smooth", "solid", "wall") if key in how]
     return " ".join([f"--nodes {NODES}", *given, *(["--close-holes"] if "holes" in how else [])])
 
 

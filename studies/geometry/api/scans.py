@@ -2,7 +2,7 @@
 
 import warnings
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -27,7 +27,7 @@ from studies.geometry.files.units import (
 from studies.geometry.mesh.checks import check_finite, check_one_part, check_surface, check_volume
 from studies.geometry.mesh.organ_mesh import OrganMesh, boundary_triangles, signed_volume
 from studies.geometry.mesher.jobs import LEVEL, TIME_LIMIT, cached, mesh_from, run_worker
-from studies.geometry.scanned.fidelity import warnings_of
+from studies.geometry.scanned.fidelity import spread, warnings_of
 from studies.geometry.scanned.level_grid import grid_from, shape_of
 from studies.geometry.shape.levelset import Shape
 from studies.geometry.shape.regions import PaintedRegion, Region, region_to_dict
@@ -116,10 +116,22 @@ def scan(
     recipe |= remeshing.recipe | {"kind": "scan", "nodes": int(nodes), "fill": bool(fill), "regions": outlines}
     grid = level_arrays(recipe, surface) if remeshing.on_shape else {}
     mesh = mesh_from(recipe, {"points": surface.points, "triangles": surface.triangles} | grid)
+    mesh = replace(mesh, losses=with_file(mesh, surface))
     check_amount(mesh.volume + mesh.lumen_volume, name)
-    for sentence in warnings_of(mesh.losses):
+    for sentence in warnings_of(mesh.losses, filled=remeshing.solid is not None):
         warnings.warn(f"{name}: {sentence}", stacklevel=2)
     return mesh
+
+
+def with_file(mesh: OrganMesh, surface: RepairedSurface) -> dict[str, Any]:
+    """The losses of a mesh, its volume compared with that of the whole file, less the lumens where both have some."""
+    losses = dict(mesh.losses)
+    if surface.lumen is not None and mesh.hollow:
+        inner = (mesh.points, mesh.lumen_triangles)
+        losses |= {"lumen": spread(surface.lumen, inner), "volume_mesh": losses["volume_mesh"] - mesh.lumen_volume}
+    elif surface.lumen is not None:
+        return losses  # the outer surfaces alone
+    return losses if np.isnan(surface.volume) else losses | {"volume_file": surface.volume}
 
 
 def painted(path: str | Path | Source, name: str, unit: str | None = None) -> PaintedRegion:
@@ -168,13 +180,52 @@ def repaired_surface(source: Source, content: Content, remeshing: Remeshing) -> 
     change. Raises StudyError for a surface that cannot be repaired or has the size of no organ."""
     path = source.path
     welded = weld(*in_metres(source, content))
-    # `solid` needs all parts of the surface, which may be open.
-    surface = mend(*welded, path.name, remeshing.holes) if remeshing.solid is None else RepairedSurface(*welded, ())
+    if remeshing.solid is None:
+        surface = mend(*welded, path.name, remeshing.holes)
+        surface = replace(surface, remarks=(*surface.remarks, *kept_hollow(surface, remeshing, path.name)))
+    else:  # `solid` needs all parts of the surface, which may be open
+        volume = float("nan") if len(border(welded[1])) else abs(signed_volume(*welded))
+        surface = RepairedSurface(*welded, (), volume)
     for sentence in surface.remarks:
         warnings.warn(f"{path.name}: {sentence}", stacklevel=3)
     identity = {"sha256": source.sha256, "unit": source.unit or content.unit or "m"}
     recipe: dict[str, Any] = {"kind": "file", "name": stem_of(path), "file": path.name} | identity
     return surface, recipe | {"holes": bool(remeshing.holes)} | source.recipe
+
+
+def kept_hollow(surface: RepairedSurface, how: Remeshing, name: str) -> list[str]:
+    """A remark on the lumen of a surface that gets a wall; [] for a solid one. Raises StudyError without a wall, which
+    would fill the lumen."""
+    outer = signed_volume(surface.points, surface.triangles)
+    if surface.lumen is not None:
+        lumen = abs(signed_volume(*surface.lumen))
+        if how.wall is not None:
+            return [f"its lumen of {1e6 * lumen:.4g} mL becomes that of an even wall of {1e3 * how.wall:.4g} mm"]
+        what = f"a lumen of {1e6 * lumen:.4g} mL in {1e6 * (outer - lumen):.4g} mL of tissue"
+    elif surface.nested and how.wall is None:
+        lumen = surface.nested
+        what = f"a closed surface of {1e6 * lumen:.4g} mL in one of {1e6 * outer:.4g} mL: a lumen, or another body"
+    else:
+        return []
+    wall = 1e3 * wall_round(surface, lumen)
+    raise StudyError(
+        f"{name} has {what}; --wall {wall:g} with --nodes keeps it hollow, as an even wall of the same volume, and "
+        "--solid 0 fills it"
+    )
+
+
+def wall_of(source: Source) -> float | None:
+    """Thickness [m] of the even wall that keeps the lumens of a file; None for a solid one. Raises StudyError for a
+    file that cannot be read or repaired."""
+    surface = mend(*weld(*in_metres(source, opened(source))), source.path.name)
+    return None if surface.lumen is None else wall_round(surface, abs(signed_volume(*surface.lumen)))
+
+
+def wall_round(surface: RepairedSurface, lumen: float) -> float:
+    """Thickness [m], to three digits, of the even wall round a lumen of this volume [m³]."""
+    from studies.geometry.scanned.distance_grid import even_wall  # loads compiled code
+
+    return 1e-3 * float(f"{1e3 * even_wall(surface.points, surface.triangles, lumen):.3g}")
 
 
 def in_metres(source: Source, content: Content) -> tuple[np.ndarray, np.ndarray]:

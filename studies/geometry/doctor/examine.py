@@ -12,6 +12,7 @@ from studies.geometry.doctor.measures import describe_springs, describe_surface,
 from studies.geometry.files.checked_reading import weld
 from studies.geometry.files.content import Content, parts_in
 from studies.geometry.files.formats import opened
+from studies.geometry.files.masks import is_mask
 from studies.geometry.files.units import UNITS, Source, as_source, check_range, likely_units
 from studies.geometry.mesh.organ_mesh import OrganMesh, boundary_triangles
 
@@ -65,7 +66,7 @@ def examine(
         "duplicate_points": 0,
     }
     if np.isfinite(points).all():
-        welding["part_list"] = parts_in(content, metres)
+        welding["part_list"] = [] if is_mask(file.path) else parts_in(content, metres)  # --part is a label there
         points, cells = weld(points, cells)
         # An STL file repeats the corners of every triangle, which is no fault.
         welding["duplicate_points"] = 0 if file.path.suffix.lower() == ".stl" else count - len(points)

@@ -18,7 +18,7 @@ from studies.geometry.mesh.organ_mesh import (
 )
 from studies.geometry.mesh.quality import dihedral_angles, tetrahedron_radius_ratio, triangle_radius_ratio
 from studies.geometry.surface.intersections import crossing_triangles
-from studies.geometry.surface.repair import border, edge_pairs, oriented, part_of, without_repeats
+from studies.geometry.surface.repair import border, edge_pairs, encloses, largest, oriented, part_of, without_repeats
 
 MEASURED_BODY = 6000
 """Most nodes of a body for which the largest frequency of the springs is computed, which takes seconds."""
@@ -86,20 +86,23 @@ def hole_list(points: np.ndarray, triangles: np.ndarray) -> list[dict[str, Any]]
 def describe_parts(points: np.ndarray, triangles: np.ndarray, surface: dict[str, Any]) -> dict[str, Any]:
     """Numbers of separate parts, lumens, inverted parts, and handles ("genus"); surface: measures of `describe_edges`.
 
-    An inverted part inside the box of the largest part bounds a lumen. Counted only for closed, oriented surfaces,
+    An inverted part inside the largest part bounds a lumen. Counted only for closed, oriented surfaces,
     handles only if they are also manifold.
     """
     parts = part_of(triangles)
     pieces = [triangles[parts == k] for k in range(int(parts.max()) + 1)] if len(parts) else []
-    boxes = [(points[p.ravel()].min(axis=0), points[p.ravel()].max(axis=0)) for p in pieces]
     measures: dict[str, Any] = {"parts": len(pieces), "lumens": 0, "inside_out_parts": 0, "genus": None}
+    measures["lumen_volume"] = 0.0
     if not pieces or not (surface["closed"] and surface["oriented"]):
         return measures
-    main = int(np.argmax([np.linalg.norm(high - low) for low, high in boxes]))
+    main = largest(points, triangles, parts)
     for k, piece in enumerate(pieces):
-        if signed_volume(points, piece) < 0:
-            inside = (boxes[k][0] > boxes[main][0]).all() and (boxes[k][1] < boxes[main][1]).all()
-            measures["lumens" if k != main and inside else "inside_out_parts"] += 1
+        volume = signed_volume(points, piece)
+        if volume < 0 and k != main and encloses(points, pieces[main], piece):
+            measures["lumens"] += 1
+            measures["lumen_volume"] -= volume
+        elif volume < 0:
+            measures["inside_out_parts"] += 1
     if surface["manifold"]:
         euler = len(np.unique(triangles)) - len(unique_edges(triangles)) + len(triangles)
         measures["genus"] = len(pieces) - euler // 2

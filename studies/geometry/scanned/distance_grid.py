@@ -3,11 +3,14 @@ scan."""
 
 import numpy as np
 from scipy.ndimage import distance_transform_edt
+from scipy.optimize import root_scalar
 
 from studies.geometry.mesh.organ_mesh import triangle_areas
 from studies.geometry.scanned.level_grid import DistanceGrid
 from studies.geometry.surface.triangle_distance import band_distance_into, far_distance_into
 
+WALL_CELLS = 100
+"""Cells along the diagonal on which the thickness of a wall is found, to about 1 %."""
 BAND = 4.0
 """Distance in cells up to which the grid is exact; farther out it is accurate to a few per cent of a cell."""
 
@@ -23,6 +26,17 @@ def distance_grid(points: np.ndarray, triangles: np.ndarray, cell: float, margin
     inside = winding_number(points, triangles, axes) > 0
     squared = squared_distance((points[triangles] - low) / cell, tuple(shape))
     return DistanceGrid(low, cell, np.where(inside, -cell, cell) * np.sqrt(squared))
+
+
+def even_wall(points: np.ndarray, triangles: np.ndarray, lumen: float) -> float:
+    """Thickness [m] of the even wall inside a closed outward surface that leaves a lumen of this volume [m³]."""
+    cell = box_of(points, triangles)[0] / WALL_CELLS
+    grid = distance_grid(points, triangles, cell, 2.0 * cell)
+
+    def excess(wall: float) -> float:
+        return DistanceGrid(grid.low, cell, grid.values + wall).volume - lumen
+
+    return float(root_scalar(excess, bracket=(0.0, -float(grid.values.min()) + cell), xtol=1e-6 * cell).root)
 
 
 def squared_distance(corners: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:

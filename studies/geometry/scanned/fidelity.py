@@ -57,13 +57,17 @@ def samples(points: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.n
     return places[::step], weights[::step]
 
 
-def warnings_of(lost: dict[str, Any]) -> list[str]:
-    """Sentences that warn the user of deviations, as `fidelity` returns them; empty if all are small."""
+def warnings_of(lost: dict[str, Any], filled: bool = False) -> list[str]:
+    """Sentences that warn the user of deviations, as `fidelity` returns them; empty if all are small. filled: whether
+    the user asked for more volume than the surface has."""
     sentences = []
     for key, what in (
         ("file_to_mesh", "this part of the file is missing from the mesh"),
         ("mesh_to_file", "the mesh has a part here that the file does not"),
+        ("lumen", "the lumen of the file has another place or another thickness of the wall"),
     ):
+        if key not in lost:
+            continue
         far, place = lost[key]["max"], lost[key]["where"]
         if far > min(NOTABLE * lost["diagonal"], lost["edge"]):
             where = ", ".join(f"{1e3 * x:.4g}" for x in place)
@@ -78,7 +82,7 @@ def warnings_of(lost: dict[str, Any]) -> list[str]:
             "ones with --smooth"
         )
     change = lost["volume_mesh"] / lost["volume_file"] - 1.0
-    if abs(change) > NOTABLE:
+    if abs(change) > NOTABLE and not filled:
         sentences.append(
             f"the volume is {1e6 * lost['volume_mesh']:.4g} mL, that of the file {1e6 * lost['volume_file']:.4g} mL "
             f"({100 * change:+.2g} %)"

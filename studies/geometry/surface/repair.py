@@ -7,6 +7,9 @@ import numpy as np
 from studies.base.errors import StudyError
 from studies.geometry.mesh.organ_mesh import Surface, compact, connected, signed_volume, triangle_areas
 
+FILLED = 0.005
+"""Share of the volume that an outer surface encloses up to which lumens in it are filled: the bound of our bodies."""
+
 
 @dataclass(frozen=True, eq=False)
 class RepairedSurface:
@@ -16,11 +19,17 @@ class RepairedSurface:
     triangles: np.ndarray
     remarks: tuple[str, ...]
     """One sentence for each kind of change, for the user."""
+    volume: float
+    """Of the file [m³]: all its closed parts, less its lumens."""
+    lumen: Surface | None = None
+    """Surface of the lumens, if they are more than FILLED: what looks inwards inside the outer surface."""
+    nested: float = 0.0
+    """Volume [m³] of closed parts inside the outer surface that look outwards: lumens or bodies."""
 
 
 def mend(points: np.ndarray, triangles: np.ndarray, name: str, holes: bool = False) -> RepairedSurface:
     """The largest part of a welded surface of points (n, 3) [m] and triangles (t, 3), without duplicate and collapsed
-    triangles, flipped to agree with their neighbours and to look outward.
+    triangles, flipped to agree with their neighbours and to look outward; and its lumens.
 
     holes: whether each border is closed by a fan of triangles over the mean of its nodes. name: for messages. Raises
     StudyError if nothing is left, or for a surface with one side only.
@@ -33,13 +42,21 @@ def mend(points: np.ndarray, triangles: np.ndarray, name: str, holes: bool = Fal
     if not len(triangles):
         raise StudyError(f"{name}: no usable triangle is left; export the surface again")
     parts = part_of(triangles)
-    count = int(parts.max()) + 1
-    if count > 1:
-        keep = largest(points, triangles, parts)
-        lost = triangle_areas(points, triangles[parts != keep]).sum() / triangle_areas(points, triangles).sum()
-        triangles = triangles[parts == keep]
-        remarks.append(f"{count - 1} of {count} separate parts are left out ({100 * lost:.2g} % of the area)")
-    triangles, turned = oriented(triangles, name)
+    keep = largest(points, triangles, parts)
+    others = [triangles[parts == k] for k in range(int(parts.max()) + 1) if k != keep]
+    area = triangle_areas(points, triangles).sum()
+    triangles, turned = oriented(triangles[parts == keep], name)
+    outer = signed_volume(points, triangles)
+    volumes = [0.0 if len(border(part)) else np.sign(outer) * signed_volume(points, part) for part in others]
+    rows = list(zip(others, volumes, strict=True))
+    lumens = [row for row in rows if row[1] < 0 and encloses(points, triangles, row[0])]
+    inner = [v for part, v in rows if v > FILLED * abs(outer) and encloses(points, triangles, part)]
+    lost = [part for part, _ in rows if all(part is not one for one, _ in lumens)]
+    if lost:
+        share = triangle_areas(points, np.concatenate(lost)).sum() / area
+        remarks.append(
+            f"{len(lost)} of {len(others) + 1} separate parts are left out ({100 * share:.2g} % of the area)"
+        )
     if turned:
         remarks.append(f"{turned} triangles are flipped to agree with their neighbours")
     if holes:
@@ -49,7 +66,23 @@ def mend(points: np.ndarray, triangles: np.ndarray, name: str, holes: bool = Fal
     if signed_volume(points, triangles) < 0:
         triangles = triangles[:, ::-1].copy()
         remarks.append("the surface was inverted and has been flipped")
-    return RepairedSurface(*compact(points, triangles), tuple(remarks))
+    outer, hollow = signed_volume(points, triangles), -sum(volume for _, volume in lumens)
+    lumen = compact(points, np.concatenate([part for part, _ in lumens])) if hollow > FILLED * outer else None
+    if hollow > 0 and lumen is None:
+        remarks.append(f"lumens of together {1e6 * hollow:.2g} mL are filled ({100 * hollow / outer:.2g} %)")
+    nested = 0.0 if lumens else sum(inner)
+    return RepairedSurface(*compact(points, triangles), tuple(remarks), outer + sum(volumes), lumen, nested)
+
+
+def encloses(points: np.ndarray, triangles: np.ndarray, part: np.ndarray) -> bool:
+    """Whether a surface of triangles (t, 3) winds round the first node of a part (s, 3): the solid angles of its
+    triangles (A. van Oosterom, J. Strackee, IEEE Trans. Biomed. Eng. 30, 1983) are more than half a sphere."""
+    a, b, c = (points[triangles] - points[part[0, 0]]).transpose(1, 0, 2)
+    lengths = [np.linalg.norm(corner, axis=1) for corner in (a, b, c)]
+    cosines = [np.einsum("ij,ij->i", one, other) for one, other in ((b, c), (c, a), (a, b))]
+    below = lengths[0] * lengths[1] * lengths[2] + sum(x * y for x, y in zip(cosines, lengths, strict=True))
+    angles = np.arctan2(np.einsum("ij,ij->i", a, np.cross(b, c)), below)
+    return bool(abs(angles.sum()) > np.pi)
 
 
 def without_repeats(triangles: np.ndarray) -> np.ndarray:

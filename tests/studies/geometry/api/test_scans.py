@@ -1,6 +1,7 @@
 """Real organs: every surface in shared/meshes becomes a body of 550 nodes that is near to it."""
 
 import json
+import re
 import warnings
 
 import meshio
@@ -9,6 +10,7 @@ import pytest
 
 from studies.base.errors import StudyError
 from studies.geometry import check_surface, check_tetrahedra, curved, read_mesh, scan, true_shape_of
+from studies.geometry.doctor.examine import examine
 from studies.geometry.files.units import Source
 from studies.geometry.mesh.organ_mesh import signed_volume
 from studies.geometry.mesh.quality import dihedral_angles, tetrahedron_radius_ratio
@@ -104,6 +106,53 @@ def test_a_wall_makes_it_hollow(block):
     assert thickness == pytest.approx(np.full(300, 0.004), rel=0.1)
 
 
+@pytest.fixture
+def bladder(block, tmp_path):
+    """The egg with a lumen: 6 mm of wall along its longest axis, 3.2 to 4 along the others."""
+    points, faces = block[1:]
+    return write(tmp_path / "bladder.vtu", *together((points, faces), (0.84 * points, faces[:, ::-1])))
+
+
+LUMEN = 0.84**3
+TISSUE = 1 - LUMEN
+
+
+def test_a_lumen_is_kept_or_refused(block, bladder):
+    whole = volume_of(block)
+    with pytest.raises(StudyError) as caught:
+        scan(bladder, 200, unit="mm")
+    way = re.fullmatch(
+        r"bladder\.vtu has a lumen of (\S+) mL in (\S+) mL of tissue; --wall (\S+) with --nodes keeps it hollow, as an "
+        "even wall of the same volume, and --solid 0 fills it",
+        str(caught.value),
+    )
+    assert way is not None
+    assert [float(way[k]) for k in (1, 2)] == pytest.approx([1e6 * LUMEN * whole, 1e6 * TISSUE * whole], rel=1e-3)
+    with pytest.warns(UserWarning, match=r"its lumen of .* mL becomes that of an even wall of"):
+        mesh = scan(bladder, 300, unit="mm", wall=MM * float(way[3]))
+    assert mesh.hollow and mesh.volume == pytest.approx(TISSUE * whole, rel=0.01)
+    # Both volumes are of the tissue, that of the file to the last digit that the doctor prints.
+    assert mesh.losses["volume_file"] == pytest.approx(examine(bladder, unit="mm").measures["volume"], rel=1e-9)
+    assert mesh.losses["volume_mesh"] == pytest.approx(mesh.volume, rel=1e-9)
+    assert 5e-4 < mesh.losses["lumen"]["max"] < 3e-3  # the wall of the file is thicker at the ends
+
+
+def test_a_lumen_is_filled_on_request(block, bladder):
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        mesh = scan(bladder, 200, unit="mm", solid=0.0, fill=False)
+    assert mesh.volume == pytest.approx(volume_of(block), rel=5e-3)
+    assert mesh.losses["volume_file"] == pytest.approx(TISSUE * volume_of(block), rel=1e-6)
+
+
+def test_the_file_has_the_volume_of_all_its_parts(block, tmp_path):
+    _, points, faces = block
+    path = write(tmp_path / "two.vtu", *together((points, faces), box((90, 90, 90), (110, 110, 110))))
+    with pytest.warns(UserWarning, match=r"two\.vtu: the volume is .*, that of the file"):
+        mesh = scan(path, 200, unit="mm", fill=False)
+    assert mesh.losses["volume_file"] == pytest.approx(volume_of(block) + 8e-6, rel=1e-9)
+
+
 def test_units_are_never_guessed(block, tmp_path):
     path, points, faces = block
     with pytest.raises(StudyError) as caught:
@@ -134,6 +183,7 @@ def test_the_true_shape_is_one_for_flat_and_curved_and_hollow_meshes(block):
 
 
 REFUSED = {
+    "has a closed surface of .* mL in one of .* mL: a lumen, or another body; --wall": ({"inner": 0.84}, slice(None)),
     r"the surface is open at \d+ edges; close the holes \(--close-holes\)": ({}, slice(5, None)),
     "open at 3 edges": ({}, slice(1)),
     "not a plausible organ size in m, cm or mm; say --unit mm": ({"scale": 1e3, "unit": None}, slice(None)),
@@ -153,7 +203,8 @@ REFUSED = {
 def test_what_cannot_become_a_body_gets_a_sentence(block, tmp_path, sentence):
     how, rows = REFUSED[sentence]
     how = {"nodes": 200, "unit": "mm"} | how
-    path = write(tmp_path / "bad.vtu", how.pop("scale", 1.0) * block[1], block[2][rows])
+    surface, inner = (how.pop("scale", 1.0) * block[1], block[2][rows]), how.pop("inner", 0.0)
+    path = write(tmp_path / "bad.vtu", *(together(surface, (inner * surface[0], surface[1])) if inner else surface))
     with pytest.raises(StudyError, match=sentence) as caught:
         scan(path, **how)
     assert "\n" not in str(caught.value)

@@ -46,14 +46,37 @@ def test_moebius_bands_are_refused():
     assert oriented(box()[1], "box")[1] == 0
 
 
-def test_only_the_largest_part_stays():
+@pytest.mark.parametrize("inverted", [False, True])
+def test_only_the_largest_part_stays_with_its_lumen(inverted):
     speck, lumen = box((3, 3, 3), (3.1, 3.1, 3.1)), box((0.2, 0.2, 0.2), (0.6, 0.6, 0.6))
     points, faces = together(speck, box(), (lumen[0], lumen[1][:, ::-1]))
     assert len(np.unique(part_of(faces))) == 3
-    surface = mend(points, faces, "box")
+    surface = mend(points, faces[:, ::-1] if inverted else faces, "box")
     assert len(surface.points) == 8 and signed_volume(surface.points, surface.triangles) == pytest.approx(1.0)
-    share = 100 * (6 * 0.01 + 6 * 0.16) / (6 + 6 * 0.01 + 6 * 0.16)
-    assert surface.remarks == (f"2 of 3 separate parts are left out ({share:.2g} % of the area)",)
+    share = 100 * 6 * 0.01 / (6 + 6 * 0.01 + 6 * 0.16)
+    assert surface.remarks[0] == f"1 of 3 separate parts are left out ({share:.2g} % of the area)"
+    assert surface.lumen and abs(signed_volume(*surface.lumen)) == pytest.approx(0.064)
+    assert surface.volume == pytest.approx(1.0 + 0.001 - 0.064)  # as the file has it
+
+
+def test_a_small_lumen_is_filled_and_said():
+    small = box((0.2, 0.2, 0.2), (0.3, 0.3, 0.3))
+    surface = mend(*together(box(), (small[0], small[1][:, ::-1])), "box")
+    assert surface.lumen is None and surface.volume == pytest.approx(0.999)
+    assert surface.remarks == ("lumens of together 1e+03 mL are filled (0.1 %)",)
+
+
+def test_what_looks_inwards_beside_the_body_is_no_lumen():
+    points, faces = together(box((0, 0, 0), (3, 3, 1)), box((0, 0, 1.5), (1, 1, 2)))
+    faces[12:] = faces[12:, ::-1]
+    surface = mend(points, faces, "box")
+    assert surface.lumen is None and "1 of 2 separate parts are left out" in surface.remarks[0]
+
+
+def test_a_body_in_a_body_is_named():
+    surface = mend(*together(box(), box((0.2, 0.2, 0.2), (0.6, 0.6, 0.6))), "box")
+    assert surface.lumen is None and surface.nested == pytest.approx(0.064)
+    assert surface.volume == pytest.approx(1.064)
 
 
 def test_doubled_and_collapsed_triangles_go():
