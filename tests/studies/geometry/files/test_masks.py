@@ -149,7 +149,7 @@ def test_the_data_of_a_header_lie_in_its_folder(tmp_path):
     os.mkfifo(folder / "pipe")
     for other in (f"../{file.name}", str(file), "link", "pipe", "missing"):
         (folder / "a.nhdr").write_text(header.replace(file.name, other))
-        with pytest.raises(StudyError, match="is no file in the folder of a.nhdr; put it there"):
+        with pytest.raises(StudyError, match=r"is no file in the folder of a\.nhdr; put it there"):
             opened(Source(folder / "a.nhdr", part="1"))
 
 
