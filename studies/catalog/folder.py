@@ -9,7 +9,7 @@ import studies.geometry as geometry
 from massspring import Sphere, Trajectory
 from studies.base.errors import StudyError
 from studies.catalog.study import Study
-from studies.geometry.files.formats import ENDINGS
+from studies.geometry.files.opening import ENDINGS
 from studies.geometry.files.units import Source, check_unit, stem_of
 from studies.scene.chosen_place import DEPTH, RADIUS
 from studies.scene.kind import has_wall

@@ -12,7 +12,7 @@ from rich.markup import escape
 from studies.base.errors import StudyError
 from studies.cli.terminal import busy, visible, warn
 from studies.geometry.files.faults import check_promises, size_warning
-from studies.geometry.files.formats import opened
+from studies.geometry.files.opening import opened
 from studies.geometry.files.units import UNITS, Source, check_unit, length_of, likely_units, unit_question
 
 Unit = Annotated[str | None, typer.Option(help="unit of the file's coordinates: m, cm, mm, um or in")]

@@ -12,7 +12,7 @@ from massspring.body.surface import winding_number
 from studies.base.errors import StudyError
 from studies.base.lookup import lookup
 from studies.geometry.api.scans import Remeshing, repaired_surface
-from studies.geometry.files.formats import opened
+from studies.geometry.files.opening import opened
 from studies.geometry.organs import SHAPES, make_shape
 from studies.geometry.surface.first_surface import first_surface
 from studies.scene.clock import check_clock, is_number

@@ -13,7 +13,7 @@ from studies.geometry.api.organs import attach
 from studies.geometry.api.organs import fill as fill_mesh
 from studies.geometry.files.checked_reading import marked_nodes, weld, with_patches
 from studies.geometry.files.content import Content
-from studies.geometry.files.formats import opened
+from studies.geometry.files.opening import opened
 from studies.geometry.files.units import (
     FAR_AWAY,
     LARGEST,

@@ -11,8 +11,8 @@ from studies.geometry.doctor.findings import Finding, findings_of
 from studies.geometry.doctor.measures import describe_springs, describe_surface, describe_tetrahedra
 from studies.geometry.files.checked_reading import weld
 from studies.geometry.files.content import Content, parts_in
-from studies.geometry.files.formats import opened
 from studies.geometry.files.masks import is_mask
+from studies.geometry.files.opening import opened
 from studies.geometry.files.units import UNITS, Source, as_source, check_range, likely_units
 from studies.geometry.mesh.organ_mesh import OrganMesh, boundary_triangles
 

@@ -1,1 +1,1 @@
-"""Reads and writes mesh files. Adding a format: studies.geometry.files.formats says where."""
+"""Reads and writes mesh files. Adding a format: studies.geometry.files.opening says where."""

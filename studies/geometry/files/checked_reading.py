@@ -8,7 +8,7 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from studies.geometry.files.content import Content, coincident
-from studies.geometry.files.formats import opened
+from studies.geometry.files.opening import opened
 from studies.geometry.files.units import LARGEST, SMALLEST, Source, as_source, check_range
 from studies.geometry.mesh.checks import check_finite, check_surface, check_tetrahedra
 from studies.geometry.mesh.organ_mesh import OrganMesh, compact, signed_volume, surface_first, turn_inverted

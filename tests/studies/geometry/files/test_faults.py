@@ -13,7 +13,7 @@ from studies.base.errors import StudyError
 from studies.geometry import read_mesh, scan
 from studies.geometry.doctor.examine import examine
 from studies.geometry.files.faults import size_warning
-from studies.geometry.files.formats import opened
+from studies.geometry.files.opening import opened
 from studies.geometry.files.units import Source
 from studies.geometry.mesh.organ_mesh import signed_volume
 from tests.studies.geometry.boxes import box, split

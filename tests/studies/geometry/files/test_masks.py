@@ -12,7 +12,7 @@ import pytest
 
 from studies.base.errors import StudyError
 from studies.geometry import check_surface, read_mesh, scan
-from studies.geometry.files.formats import opened
+from studies.geometry.files.opening import opened
 from studies.geometry.files.units import Source
 from studies.geometry.mesh.organ_mesh import signed_volume
 
