@@ -62,6 +62,7 @@ def write_published(folder: Path, name: str, records: Mapping[str, tuple[Scene, 
             "sha256": hashlib.sha256(file.read_bytes()).hexdigest(),
             "physics": physics(scene),
             "unknowns": record.attributes["unknowns"],
+            "shape error": float(f"{record.attributes.get('shape_error', np.nan):.3g}"),
             "relative bars": {quantity: float(f"{bar:.3g}") for quantity, bar in bars.items()},
         }
     path.write_text(json.dumps({"set": name, "references": listed}, indent=1) + "\n", encoding="utf-8")

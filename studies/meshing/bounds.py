@@ -3,6 +3,9 @@ warning."""
 
 SHAPE, SHAPE_VOLUME = 1.0, 0.5
 """Bounds of shape_error and |shape_volume| [%]. A body that exceeds one of them is never recommended."""
+REFERENCE_SHAPE = 0.5
+"""Bound of shape_error of the finest mesh of a reference [%]. One beyond it is named: its uncertainty does not contain
+what that does to an error."""
 HELD_AREA, REFUSED_AREA = 3.0, 10.0
 """Relative errors of the area of a held region, against that on the true surface [%]: beyond HELD_AREA a warning,
 beyond REFUSED_AREA an error."""

@@ -1,25 +1,28 @@
 """Nested meshes of a reference: each halves some elements of the coarser one and is nearer to the true shape."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 from skfem import ElementTetP2, MeshTet, MeshTet2
 
-from reference_fem import nodes
+from reference_fem import facet_nodes, nodes
 from reference_fem.elements.evaluate import Evaluator
 from reference_fem.elements.shapes import basis_table, element_nodes
 from studies.base.errors import StudyError
 from studies.geometry.mesh.organ_mesh import tetrahedron_volumes
 from studies.geometry.mesh.quality import smallest_jacobian
-from studies.meshing.bounds import HELD_AREA
+from studies.geometry.surface.distance import distance_to_surface
+from studies.meshing.bounds import HELD_AREA, REFERENCE_SHAPE
 from studies.meshing.held_mesh import HeldMesh, held_mesh, rim_sides
 from studies.meshing.kept_shape import area_error, level_that_holds
 from studies.meshing.opened_mesh import opened_elements
 from studies.meshing.reference_mesh import on_true_sides
+from studies.meshing.rest_surface import rest_surfaces
 from studies.meshing.scene_mesh import mesh_for
 from studies.meshing.shaping import aimed, drawn_middles, laid_out
 from studies.meshing.true_shape import true_shape
+from studies.meshing.true_surface import true_surface
 from studies.scene.organ_file import remeshed
 from studies.scene.scene import Scene
 
@@ -43,6 +46,8 @@ LOST, MORE = 0.5 * HELD_AREA, 2.0
 """LOST: error of the area of a held region [%] up to which the coarsest mesh is accepted. Otherwise finer ones are
 tried, up to MORE times its surface nodes. Two hanging spleens lost 5 and 6 % at 270 nodes, 0.2 and 0.3 % at 292, so
 that their references turned too far (docs/population.md)."""
+FAR = 0.8 * REFERENCE_SHAPE
+"""Distance [%] from the true surface, over its size, beyond which elements are halved before all others."""
 GROWTH = 1.3
 """Factor by which the number of elements grows between two selections of the largest indicators."""
 
@@ -55,8 +60,13 @@ class NestedMesh:
     coarsest mesh."""
     points: np.ndarray
     """P2 nodes on the true shape [m], (n, 3), with mid-side nodes half-way."""
-    off: int = 0
-    """Number of boundary nodes that are off the true shape, since elements would fold otherwise."""
+    back: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    """Boundary nodes that are off the true shape, since elements would fold otherwise."""
+
+    @property
+    def off(self) -> int:
+        """Their number."""
+        return len(self.back)
 
     @cached_property
     def mesh(self) -> MeshTet2:
@@ -111,6 +121,28 @@ class NestedMesh:
         least = SMALLEST * float(np.linalg.norm(np.ptp(self.points, axis=0)))
         return small_at_outlines(self.body, self.points, least)
 
+    @cached_property
+    def far(self) -> np.ndarray:
+        """Elements with a facet that is farther from the true surface than FAR, or nearest to a part of that surface so
+        far away, (ne,) bool. Without facets next to nodes of `back`: halving brings these no nearer."""
+        far = np.zeros(self.mesh.nelements, dtype=bool)
+        truth = true_surface(self.scene.organ) if remeshed(self.scene.organ) else None
+        if truth is None:
+            return far
+        facets, bound = facet_nodes(self.mesh), FAR / 100.0 * truth.size
+        found = list[np.ndarray]()
+        for name, side in rest_surfaces(nodes(self.mesh), facets).items():
+            if name not in truth.sides:
+                continue
+            near = side.nearest(truth.sides[name][0])
+            away = distance_to_surface(side.lattice()[0], *truth.sides[name]).reshape(len(side.facets), -1)
+            found += [side.facets[near.facet[near.distance > bound]], side.facets[away.max(axis=1) > bound]]
+        corners = {tuple(sorted(one)) for one in np.concatenate(found)[:, :3].tolist()} if found else set()
+        beside = np.isin(facets, self.back).any(axis=1)
+        chosen = np.array([tuple(sorted(one)) in corners for one in facets[:, :3].tolist()]) & ~beside
+        far[self.mesh.f2t[0, self.mesh.boundary_facets()[chosen]]] = True
+        return far
+
     @property
     def lost_area(self) -> float:
         """The largest error of the area of a held region [%]; 0 if the true area is unknown."""
@@ -137,9 +169,9 @@ class NestedMesh:
         guess = interpolated(bent, owner, where)
         shape = true_shape(self.scene.organ)
         if shape is None:
-            return replace(self, body=body, points=guess, off=0), parents
+            return replace(self, body=body, points=guess, back=self.back[:0]), parents
         points, back = upright(guess, aimed(self.scene, body, shape, guess), cells, UPRIGHT)
-        return replace(self, body=body, points=points, off=int(back.sum())), parents
+        return replace(self, body=body, points=points, back=np.flatnonzero(back)), parents
 
 
 def at_nodes(mesh: MeshTet | MeshTet2, of_elements: np.ndarray) -> np.ndarray:

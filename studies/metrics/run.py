@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from scipy.spatial import KDTree
 
 from studies.base.errors import StudyError
 from studies.geometry.mesh.organ_mesh import triangle_areas
@@ -16,15 +15,11 @@ from studies.meshing.rest_surface import RestSurface, rest_surfaces, six_node_fa
 from studies.meshing.true_surface import UNKNOWN, ShapeErrors, shape_errors
 from studies.metrics.timing.protocol import FrameTiming
 from studies.reference.load import Reference
-from studies.reference.solution import BESIDE
+from studies.reference.solution import BESIDE, doubled
 from studies.runs.case import Case, case_from_json
 from studies.scene.cut import nearest_cut
 from studies.store.record import Record, read_record
 from studies.store.schema import RunAttributes, RunFields
-
-SAME_PLACE = 1e-5
-"""Distance over the size of the body below which two points coincide: far above the rounding of a published reference,
-far below an edge."""
 
 
 class BoundaryErrors(NamedTuple):
@@ -260,14 +255,6 @@ class Run:
         area = triangle_areas(self.fields.rest, triangles)
         share = np.bincount(triangles.ravel(), weights=np.repeat(area / 3, 3), minlength=len(self.fields.rest))
         return share[self.material_nodes]
-
-
-def doubled(points: np.ndarray, facets: np.ndarray, size: float) -> np.ndarray:
-    """Whether each of the facets (f, 3 or 6) of a body of a size [m] at rest lies at the place of another one, as the
-    faces of a cut do, (f,) bool."""
-    middles = points[facets[:, :3]].mean(axis=1)
-    distance, _ = KDTree(middles).query(middles, k=2)
-    return distance[:, 1] < SAME_PLACE * size
 
 
 def by_scene(runs: Sequence[Run]) -> dict[str, list[Run]]:

@@ -16,6 +16,8 @@ from studies.runs.recipe_text import recipe_text
 
 Row = dict[str, Any]
 """Column name -> value."""
+OFF_SHAPE = "reference off shape [%]"
+"""Column with the distance of the reference's finest mesh from the true shape, over the size."""
 UNRESOLVED = "doubtful"
 """Column with the metrics whose value is less than ten times the uncertainty of the reference."""
 
@@ -70,6 +72,7 @@ def row_of(run: Run, metrics: Sequence[Metric]) -> Row:
         "status": str(run.record.status),
         "recipe": recipe_text(case),
         "reference": "" if run.reference is None else run.reference.source,
+        OFF_SHAPE: float("nan") if run.reference is None else 100.0 * run.reference.shape_error,
     }
     for entry in metrics:
         row[f"{entry.name} [{entry.unit}]"] = entry(run)

@@ -25,6 +25,16 @@ class Reference(Solution):
         """The published set and file, as "2027.1 0a1b2c3d"; "solved here" for a reference that is not published."""
         return str(self.record.attributes.get("set", "solved here"))
 
+    @property
+    def shape_error(self) -> float:
+        """Largest distance of the finest mesh from the true shape, over the size [1]; NaN if it was not measured."""
+        return float(self.record.attributes.get("shape_error", np.nan))
+
+    @property
+    def warnings(self) -> str:
+        """That the finest mesh is far from the true shape; else empty."""
+        return str(self.record.attributes.get("warnings", ""))
+
     @cached_property
     def _samples(self) -> tuple[SamplePoints, list[Sample]]:
         return samples_in(self.scene, self.record)

@@ -19,7 +19,7 @@ from reference_fem.statics.newton import StepFailed
 from reference_fem.system.saddle_point import System
 from reference_fem.system.state import State
 from reference_fem.uncertainty import MeshError
-from studies.meshing.nested_mesh import NestedMesh, at_nodes, base_mesh
+from studies.meshing.nested_mesh import CHILD, NestedMesh, at_nodes, base_mesh
 from studies.reference.problem import problem_on
 from studies.reference.reference_solves import settings_varied
 from studies.reference.sample import Sample, SamplePoints, sample_of
@@ -129,7 +129,7 @@ def solve_nested(scene: Scene, variants: Mapping[str, Varied]) -> FamilySolution
             break
         equilibria = latest.equilibria
         samples.insert(0, sample_of(scene, latest.system.problem, equilibria, at, math.nan))
-        if len(samples) > 2 and fine_enough(scene, at, samples, plan.tolerance):
+        if len(samples) > 2 and fine_enough(scene, at, samples, plan.tolerance) and not latest.mesh.far.any():
             break
     for part in latest.parts:
         part.system.solver.release()
@@ -197,13 +197,15 @@ def targets(first: int, most: float) -> list[float]:
 
 
 def refined(solved: MeshSolution, unknowns: float) -> MeshSolution:
-    """The solution on a mesh of about `unknowns` unknowns, refined by the error indicator of the last checkpoint.
+    """The solution on a mesh of about `unknowns` unknowns, refined where it is far from the true shape, then by the
+    error indicator of the last checkpoint.
 
     If Newton finds no equilibrium from the transferred states, a path from rest is tried. Raises SolveError if that
     breaks off.
     """
     mesh, last = solved.mesh, solved.parts[-1]
     indicator = stress_indicator(last.system, last.states[-1].x)
+    indicator = np.where(mesh.far, indicator.max() / CHILD, indicator)
     finer, parents = mesh.finer(indicator, round(mesh.mesh.nelements * unknowns / last.system.total))
     work = problems_of(finer)
     return MeshSolution(finer, [on_finer(old, new, parents) for old, new in zip(solved.parts, work, strict=True)])

@@ -19,6 +19,7 @@ import numpy as np
 from studies.base.errors import StudyError
 from studies.base.hdf5 import reading, text_in
 from studies.reference.reference_solves import ReferenceSolve, physics_of, reference_fingerprint, with_floats
+from studies.reference.shape import shape_attributes
 from studies.scene.as_json import scene_to_json
 from studies.scene.library import CUT, JUDGED
 from studies.scene.scene import Scene
@@ -43,6 +44,8 @@ class Entry:
     file: Path
     sha256: str
     """SHA-256 of the file (hex)."""
+    shape_error: float
+    """Largest distance of its finest mesh from the true shape, over the size [1]; NaN if that is unknown."""
 
     @property
     def words(self) -> str:
@@ -81,7 +84,7 @@ def index(folder: Path = FOLDER) -> Mapping[str, Entry]:
     try:
         data = json.loads((folder / INDEX).read_text(encoding="utf-8"))
         listed = [
-            (scene, row["physics"], Entry(data["set"], folder / row["file"], row["sha256"]))
+            (scene, row["physics"], Entry(data["set"], folder / row["file"], row["sha256"], float(row["shape error"])))
             for scene, row in data["references"].items()
         ]
     except (OSError, ValueError, LookupError, TypeError, AttributeError) as error:
@@ -133,7 +136,9 @@ def record_of(scene: Scene, entry: Entry) -> Record:
         status=Status.OK,
         message="",
         fingerprint=fingerprint_of(scene),
-        attributes=attributes | {"scene": scene.name, "set": entry.words},
+        attributes=attributes
+        | shape_attributes(scene.name, entry.shape_error)
+        | {"scene": scene.name, "set": entry.words},
         fields=new_fields(REFERENCE_FIELDS, values),
     )
 

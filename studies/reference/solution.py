@@ -85,6 +85,9 @@ NOTHING = 1e-9
 """Distance from an element, over the size of the body, below which a point is inside."""
 BESIDE = 1e-3
 """Distance from a cut, over the size of the body, at which a point is surely on one side of it."""
+SAME_PLACE = 1e-5
+"""Distance over the size of the body below which two points coincide: far above the rounding of a published reference,
+far below an edge."""
 TURNED = [0, 2, 1, 5, 4, 3]
 """A six-node facet seen from its other side."""
 
@@ -213,3 +216,11 @@ class Solution:
             part + k * len(points) if s.prod() > 0 else part[:, ::-1] + k * len(points) for k, s in enumerate(OCTANTS)
         ]
         return (OCTANTS[:, None, :] * points).reshape(-1, 3), np.vstack(faces)
+
+
+def doubled(points: np.ndarray, facets: np.ndarray, size: float) -> np.ndarray:
+    """Whether each of the facets (f, 3 or 6) of a body of a size [m] at rest lies at the place of another one, as the
+    faces of a cut do, (f,) bool."""
+    middles = points[facets[:, :3]].mean(axis=1)
+    distance, _ = KDTree(middles).query(middles, k=2)
+    return distance[:, 1] < SAME_PLACE * size

@@ -24,6 +24,8 @@ from studies.reference.nested import FamilySolution, solve_nested
 from studies.reference.problem import reference_problem, whole_forces
 from studies.reference.reference_solves import ReferenceSolve, reference_fingerprint, settings_varied
 from studies.reference.sample import Sample, SamplePoints, mean_pressure, sample_fields, sample_of
+from studies.reference.shape import shape_attributes, shape_of
+from studies.reference.solution import Solution
 from studies.reference.uncertainty import KAPPA_FACTOR, PENALTY_FACTOR, STEP_FACTOR
 from studies.scene.scene import Scene
 from studies.store.record import Field, Status, new_fields, new_record, write_record
@@ -87,6 +89,9 @@ def solve(root: Path, reference_solve: ReferenceSolve) -> Path:
         },
         fields=fields_of(scene, solution),
     )
+    if record.status == Status.OK:
+        shape = shape_attributes(scene.name, shape_of(Solution(scene, record)).distance)
+        record = replace(record, attributes=record.attributes | shape)
     write_record(record_file, record)
     return record_file
 

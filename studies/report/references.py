@@ -8,10 +8,9 @@ import pandas as pd
 
 from massspring.sources import own_modules, source_fingerprint
 from studies.base.atomic import write_whole
-from studies.meshing.rest_surface import rest_surfaces
-from studies.meshing.true_surface import ShapeErrors, shape_errors
 from studies.reference.load import Reference
 from studies.reference.reference_solves import STUDY
+from studies.reference.shape import shape_of
 from studies.reference.uncertainty import FACTORS
 from studies.scene.scene import Scene
 from studies.store.paths import study_folder
@@ -28,20 +27,12 @@ def references_by_scene(references: References, scenes: Iterable[Scene]) -> dict
     return {name: reference for name, reference in by_scene.items() if reference is not None}
 
 
-def shape_of_reference(reference: Reference) -> ShapeErrors:
-    """Deviation of the finest, curved mesh of a reference from the true shape. The distance is NaN in a scene with a
-    cut, whose faces belong to the boundary and lie inside the organ."""
-    points, facets, _ = reference.boundary
-    shape = shape_errors(reference.scene.organ, rest_surfaces(points, facets), filled=True)
-    return shape._replace(distance=float("nan")) if reference.scene.cuts else shape
-
-
 def uncertainty_table(references: Mapping[str, Reference]) -> pd.DataFrame:
     """A row per scene and quantity: its shares, their sum, order, shift; relative [%]. The same in all rows of a scene:
-    how far the finest mesh is from the true shape, empty in a scene with a cut."""
+    how far the finest mesh is from the true shape."""
     rows = []
     for scene, reference in references.items():
-        shape = shape_of_reference(reference)
+        shape = shape_of(reference)
         for quantity, uncertainty in reference.uncertainty.items():
             shares = {
                 f"{name} [%]": 100 * uncertainty.shares.get(name, float("nan")) for name in ("mesh", "edge", *FACTORS)

@@ -182,6 +182,8 @@ class ReferenceAttributes(Table):
     unknowns = value(int, "1", "unknowns of the finest mesh")
     steps_done = value(int, "1", "checkpoints that were reached")
     off_shape = value(int, "1", "boundary nodes that are not on the true shape, or elements would fold")
+    shape_error = optional_value(float, "1", "largest distance of the finest mesh from the true shape, over the size")
+    warnings = optional_value(str, "", "that the finest mesh is far from the true shape")
     stopped = value(str, "", "why refinement ended before the plan's tolerance; empty where it did not")
     set = optional_value(str, "", "the published set and file of references that it is of")
     seconds = value(float, "s", "wall time of all solutions")

@@ -1,6 +1,6 @@
 """The stored runs of a study, with their references and frame times."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -42,6 +42,11 @@ class References:
         reference = self._look(scene)
         return reference if isinstance(reference, StudyError) else None
 
+    def warnings(self, scenes: Iterable[Scene]) -> list[StudyError]:
+        """Those of the references that were read."""
+        read = (self._read.get(scene_to_json(scene)) for scene in scenes)
+        return [StudyError(one.warnings) for one in read if isinstance(one, Reference) and one.warnings]
+
     def _look(self, scene: Scene) -> Reference | StudyError | None:
         key = scene_to_json(scene)
         if key not in self._read:
@@ -53,7 +58,8 @@ class References:
 
 
 def load_runs(root: Path, study: Study, references: References | None = None) -> tuple[list[Run], list[str]]:
-    """The stored runs of a study with references and frame times, and what is missing or damaged, a sentence each.
+    """The stored runs of a study with references and frame times, and what is missing or damaged,
+    or a reference warns of, a sentence each.
 
     references: those of a ledger of `root`, where other studies need them too.
     """
@@ -63,18 +69,19 @@ def load_runs(root: Path, study: Study, references: References | None = None) ->
         run, missing = load_run(references, job)
         runs += [run] if run else []
         problems += missing
-    return runs, sentences(problems)
+    return runs, sentences([*problems, *references.warnings(study.scenes)])
 
 
 def table_rows(references: References, study: Study, metrics: Sequence[Metric]) -> tuple[list[Row], list[str]]:
-    """A row per stored case (studies.metrics.table), and what is missing or damaged in sentences. One run is in memory
+    """A row per stored case (studies.metrics.table), and what is missing or damaged, or a reference warns
+    of, in sentences. One run is in memory
     at a time."""
     rows, problems = list[Row](), reference_problems(references, study)
     for job in case_jobs(references.ledger.root, study):
         run, missing = load_run(references, job)
         rows += [row_of(run, metrics)] if run else []
         problems += missing
-    return rows, sentences(problems)
+    return rows, sentences([*problems, *references.warnings(study.scenes)])
 
 
 def load_run(references: References, job: CaseJob) -> tuple[Run | None, list[StudyError]]:

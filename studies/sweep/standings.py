@@ -9,7 +9,7 @@ from studies.catalog.study import Study
 from studies.store.entry import MISSING, Entry
 from studies.store.ledger import FAILURES, Ledger
 from studies.store.schema import Status
-from studies.sweep.job import Job, case_jobs, jobs_of
+from studies.sweep.job import Job, case_jobs, jobs_of, reference_jobs
 
 CAUSES = 8
 """Of failures that are named one by one."""
@@ -51,8 +51,9 @@ def failed(ledger: Ledger, job: Job) -> bool:
 
 
 def warnings_of(ledger: Ledger, study: Study) -> list[str]:
-    """What the cases of a study warned of when they were prepared, a sentence each."""
-    entries = map(ledger.entry, case_jobs(ledger.root, study))
+    """What the references and cases of a study warned of, a sentence each."""
+    jobs = (*reference_jobs(ledger.root, study.scenes), *case_jobs(ledger.root, study))
+    entries = map(ledger.entry, jobs)
     return [entry.warnings for entry in entries if entry is not None and entry.warnings]
 
 

@@ -72,6 +72,7 @@ def reference(motion=bend, force=(1.0, 2.0), pressure=(10.0, 20.0)):
     """What Reference promises, with a displacement that is a formula."""
     return SimpleNamespace(
         source="made up",
+        shape_error=float("nan"),
         displacement=motion,
         force=np.array(force),
         boundary=Boundary(POINTS, TRIANGLES, motion(POINTS)),

@@ -78,10 +78,13 @@ def show_references(ledger: Ledger, scenes: Iterable[Scene]) -> None:
     table = Table(box=None, pad_edge=False)
     for heading in ("scene", "unknowns", "seconds", "state"):
         table.add_column(heading, justify="left" if heading in ("scene", "state") else "right")
-    for standing in (standing_of(ledger, job) for job in jobs):
+    found = [standing_of(ledger, job) for job in jobs]
+    for standing in found:
         entry = standing.entry
         seconds = "-" if entry is None or entry.seconds is None else f"{entry.seconds:.0f}"
         unknowns = "-" if entry is None or entry.unknowns is None else f"{entry.unknowns:,}"
         table.add_row(standing.job.work.name, unknowns, seconds, standing.status)
     say("references:")
     console.print(table)
+    for warning in dict.fromkeys(one.entry.warnings for one in found if one.entry is not None and one.entry.warnings):
+        say(f"  {warning}")

@@ -9,9 +9,10 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
 from studies.base.counting import heading, readable
+from studies.meshing.bounds import REFERENCE_SHAPE
 from studies.metrics.cells import MISSING, plain, value_cell
 from studies.metrics.metrics import METRICS
-from studies.metrics.table import UNRESOLVED
+from studies.metrics.table import OFF_SHAPE, UNRESOLVED
 from studies.report.page.svg import inline
 
 ASSETS = Path(__file__).parent / "assets"
@@ -89,9 +90,12 @@ def table(rows: Sequence[Mapping[str, Any]], cases: Mapping[str, Any]) -> Entry:
 
 
 def _names(row: Mapping[str, Any], cases: Mapping[str, Any]) -> Entry:
-    """Scene, body and method; an entry from outside is marked as one, and so is a run that did not end well."""
+    """Scene, body and method; marks: an entry from outside, a reference that is far from the shape, a run that did
+    not end well."""
     case = cases.get(row["case"])
     marks = ["entry"] if row.get("entry") else []
+    off = row.get(OFF_SHAPE)
+    marks += [f"reference {off:.2g} % off the shape"] if off is not None and off > REFERENCE_SHAPE else []
     return {
         "case": None if case is None else row["case"],
         "title": None if case is None else case["title"],

@@ -57,6 +57,7 @@ def reference(scene):
         surface=lambda: (POINTS[:6] * STRETCH, TRIANGLES),
         force=4.0 * t / t[-1],
         source="made up",
+        shape_error=float("nan"),
         total_uncertainty=UNCERTAINTY | {"pressure": 0.05, "surface_mean": 0.01},
         scene=scene,
         displacements=lambda points: (t / t[-1])[:, None, None] * truth(points),

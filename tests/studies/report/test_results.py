@@ -66,7 +66,11 @@ def test_summary_marks_what_the_reference_does_not_know_well_enough(finished_swe
     assert UNRESOLVED_MARK not in results_of(runs)
     uncertainty = dict.fromkeys(("force_end", "silhouette", "force", "volume", "surface_mean"), 0.02)
     truth = SimpleNamespace(
-        source="made up", total_uncertainty=uncertainty, force=np.array([1.0]), displacement=lambda x: 0 * x
+        source="made up",
+        shape_error=float("nan"),
+        total_uncertainty=uncertainty,
+        force=np.array([1.0]),
+        displacement=lambda x: 0 * x,
     )
     assert f"± 2 {UNRESOLVED_MARK} |" in results_of([replace(runs[0], reference=truth)]).replace("2.0", "2")
 
