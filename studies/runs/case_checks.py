@@ -1,7 +1,8 @@
 """Checks of the settings of a case that need neither mesh nor body."""
 
 import math
-from dataclasses import is_dataclass
+from dataclasses import fields, is_dataclass
+from numbers import Real
 from typing import Any
 
 from massspring import MassSpringError
@@ -18,6 +19,16 @@ def check_settings(case: Any) -> None:
     if isinstance(case.method, type) or not is_dataclass(case.method):
         name = getattr(case.method, "__name__", repr(case.method))
         raise StudyError(f"the method is {name}; give an object, such as Free()")
+    for owner in (case.body, case.method):
+        for setting in fields(owner):
+            value = getattr(owner, setting.name)
+            if type(setting.default) in (int, float) and not _finite(value):
+                raise StudyError(f"{setting.name} is {value!r}; give a finite number, such as {setting.default!r}")
+    if not _positive(case.body.stiffness):
+        raise StudyError(f"stiffness is {case.body.stiffness!r}; it must be positive, 1 matches the tissue")
+    weights = getattr(case.body, "weights", None)
+    if weights is not None and not (isinstance(weights, tuple) and len(weights) == 4 and all(map(_finite, weights))):
+        raise StudyError(f"weights are {weights!r}; give four finite numbers, such as (1, 0.5, 0.5, 1)")
     if case.dt != "auto" and not _positive(case.dt):
         raise StudyError(f"dt is {case.dt!r} s; it must be positive, or 'auto' for a fraction of the stability limit")
     if not _positive(case.dt_fraction):
@@ -36,4 +47,8 @@ def check_settings(case: Any) -> None:
 
 
 def _positive(value: object) -> bool:
-    return isinstance(value, (int, float)) and not isinstance(value, bool) and 0 < value < math.inf
+    return _finite(value) and value > 0  # pyright: ignore[reportOperatorIssue]
+
+
+def _finite(value: object) -> bool:
+    return isinstance(value, Real) and not isinstance(value, bool) and math.isfinite(value)

@@ -4,7 +4,7 @@ saving."""
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from massspring import ImplicitVolume, Probe, Setup, Sphere, State
+from massspring import ImplicitVolume, MassSpringError, Probe, Setup, Sphere, State
 from massspring.body.volumes import Volumes
 from massspring.kernels.probe.arrays import COMPARED, IN_CONTACT, LEFT_BEHIND, TESTED
 from massspring.layout.jacobian_pattern import volume_rows
@@ -27,6 +27,14 @@ class Skip:
     """The same run with the stage."""
     remark: Callable[[Setup, State], str] = lambda setup, state: ""
     """Text on how much was skipped, from the state after the run."""
+
+    def can_be(self, setup: Setup) -> bool:
+        """Whether body and method allow the stage at all: what a set-up refuses is not left out."""
+        try:
+            self.included(setup, setup.start())
+        except MassSpringError:
+            return False
+        return True
 
 
 def _with_far(setup: Setup, state: State) -> tuple[Setup, State]:
@@ -76,7 +84,7 @@ def _is_division(setup: Setup) -> bool:
 
 SKIPS: tuple[Skip, ...] = (
     Skip("contact of nodes: no plane, sphere or capsule", lambda s: not s.solids, _with_far),
-    Skip("thin probe: none", lambda s: not s.probes and bool(s.method.capabilities.thin_probes), _with_probe),
+    Skip("thin probe: none", lambda s: not s.probes, _with_probe),
     Skip("gravity: none in this scene", lambda s: not any(s.gravity), _with_gravity),
     Skip("friction: no obstacle has any", lambda s: bool(s.solids) and not s.boundary(0).rough, _with_friction),
     Skip("linear solve: one volume is a division", _is_division, _with_rows),

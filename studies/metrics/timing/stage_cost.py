@@ -26,6 +26,7 @@ from massspring.kernels.jit.stage_clock import (
 from massspring.run.history import EXTRA, Recorder
 from massspring.run.loaded_steps import LoadedSteps
 from massspring.run.simulation import check_state
+from massspring.run.stages import Stage
 from studies.metrics.timing.protocol import pinned
 from studies.metrics.timing.skips import SKIPS
 from studies.runs.case import Case
@@ -40,7 +41,8 @@ far above noise."""
 ENDS = 100_000
 """Number of stage ends in a row from which the cost of one is measured."""
 CALL = "call of the frame"
-"""Row for the call from Python into compiled code and back, with the copies that leave the old state unchanged."""
+"""Row for the call from Python into compiled code and back, with the copies that leave the old state unchanged; where
+the load tells how many steps a frame needs, also for finding that."""
 ROWS = (*STAGES, CALL)
 PATHS, RECORDING = "paths of obstacles and targets", "recording"
 ENERGIES = "energies: no metric reads them"
@@ -61,11 +63,11 @@ def run_frames(setup: Setup, state: State, times: StageTimes = UNTIMED, frames: 
     price = end_stage_ns() if times.on[0] else 0.0
     loaded = LoadedSteps(setup, state)
     for frame in range(frames):
-        boundary = setup.boundary(frame, steps=loaded.needed(state))
+        boundary = setup.boundary(frame, steps=loaded.steps)
         if times.on[0]:
             times.spent[:], times.ended[:] = 0, 0
         begin = perf_counter_ns()
-        state = setup.method.advance(state, boundary)
+        state, _ = loaded.advanced(Stage(setup, state), state, frame, boundary)
         frame_ns[frame] = perf_counter_ns() - begin
         if times.on[0]:
             # The time of a very short stage may be less than the cost of timing it.
@@ -107,7 +109,7 @@ def cost_table(case: Case, frames: int = FRAMES, repeats: int = REPEATS, budget:
 
     Raises StudyError or MassSpringError for a case that cannot run."""
     setup = prepare(case.replaced(frames=min(frames, case.frames or case.scene.frames))).setup
-    skipped = [skip for skip in SKIPS if skip.left_out(setup)]
+    skipped = [skip for skip in SKIPS if skip.left_out(setup) and skip.can_be(setup)]
     runs = {PLAIN: partial(run_frames, setup, setup.start()), TIMED: partial(_timed, setup)}
     runs |= {skip.name: partial(run_frames, *skip.included(setup, setup.start())) for skip in skipped}
     with pinned(threads=1):

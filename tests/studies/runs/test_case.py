@@ -1,6 +1,7 @@
 """A case is its key: what is stored is what was meant, and no typo is read as something else."""
 
 import json
+import re
 from dataclasses import replace
 
 import pytest
@@ -214,3 +215,19 @@ def test_a_method_of_release_0_3_is_read():
 def test_malformed_text_is_refused(text):
     with pytest.raises(StudyError, match="not a stored case"):
         case_from_json(text)
+
+
+SETTINGS = {
+    "stiffness is inf": lambda: TetrahedralBody(150, stiffness=float("inf")),
+    "stiffness is 'hard'": lambda: TetrahedralBody(150, stiffness="hard"),
+    "stiffness is -1": lambda: TetrahedralBody(150, stiffness=-1),
+    "nodes is nan": lambda: SurfaceBody(float("nan")),
+    "weights are 'abcd'": lambda: SurfaceBody(150, weights="abcd"),
+    "weights are (1, 1, inf, 1)": lambda: SurfaceBody(150, weights=(1, 1, float("inf"), 1)),
+}
+
+
+@pytest.mark.parametrize("sentence", SETTINGS)
+def test_settings_of_a_body_are_finite_numbers(sentence):
+    with pytest.raises(StudyError, match=re.escape(sentence)):
+        tiny_case(body=SETTINGS[sentence]())

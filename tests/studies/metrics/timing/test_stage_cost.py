@@ -9,7 +9,7 @@ from massspring import Free, ImplicitVolume
 from studies.metrics.timing.skips import SKIPS
 from studies.metrics.timing.stage_cost import ENERGIES, FRAME, ROWS, SKIPPED, STAGE, cost_table, run_frames
 from studies.runs.prepare import prepare
-from studies.runs.recipes import SurfaceBody, TetrahedralBody
+from studies.runs.recipes import QuadraticBody, SurfaceBody, TetrahedralBody
 from studies.scene.library.ball_clamped import BALL_CLAMPED
 from studies.scene.library.stomach_slide import STOMACH_SLIDE
 from tests.studies.tiny import tiny_case
@@ -82,6 +82,13 @@ def test_leaving_a_stage_out_changes_no_answer(skip, method):
         assert np.abs(without.x - with_stage.x).max() < 1e-6 * setup.body.size
     else:
         assert np.array_equal(without.x, with_stage.x) and np.array_equal(without.v, with_stage.v)
+
+
+def test_a_quadratic_body_leaves_out_what_it_could_have(mesh_cache):
+    """A thin probe next to it is refused, so none is left out."""
+    table = cost_table(tiny_case(body=QuadraticBody(234)), frames=1, repeats=1)
+    assert {"gravity: none in this scene", "friction: no obstacle has any"} < set(table["what"])
+    assert "thin probe: none" not in set(table["what"])
 
 
 @pytest.mark.campaign
