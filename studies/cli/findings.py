@@ -8,6 +8,7 @@ from rich.text import Text
 from studies.cli.terminal import console, say
 from studies.geometry.api.advice import NODES
 from studies.geometry.doctor.examine import Findings
+from studies.geometry.doctor.findings import REMARKS
 from studies.geometry.files.content import LISTED
 
 
@@ -19,7 +20,8 @@ def show(report: Findings) -> None:
     if len(report.measures["part_list"]) > 1:
         console.print(parts_table(report.measures["part_list"]))
     for number, finding in enumerate(report.findings, start=1):
-        say(f"{number}. {finding.sentence}\n   -> {finding.mend}")
+        first = "remark:" if finding.code in REMARKS else f"{number}."
+        say(f"{first} {finding.sentence}\n   -> {finding.mend}")
     if report.command:
         say(f"tested; this gives a clean body of {NODES} surface nodes:\n{report.command}")
     if report.clean:

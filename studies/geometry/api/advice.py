@@ -9,15 +9,15 @@ from typing import Any
 from studies.base.errors import StudyError
 from studies.geometry.api.scans import scan, wall_of
 from studies.geometry.doctor.examine import Findings, examine
-from studies.geometry.doctor.findings import COMMAND, TRY
-from studies.geometry.files.units import Source, likely_units, stem_of
+from studies.geometry.doctor.findings import COMMAND, REMARKS, TRY
+from studies.geometry.files.units import LARGEST, SMALLEST, Source, stem_of
 
 NODES = 550
 OPENINGS, FOLDS = 5e-3, 3e-3
 """Values of --solid and --smooth in trials [m]."""
 MOST = 100_000
 """Most triangles of a file for which advice is tested; a test takes seconds."""
-BEYOND = {"bad_points", "size", "small", "far_away", "one_sided", "duplicate_tetrahedra"}
+BEYOND = {"bad_points", "size", "far_away", "duplicate_tetrahedra"}
 """Findings that no option of the command repairs."""
 
 
@@ -27,13 +27,13 @@ def with_command(source: Source, diagnosis: Findings) -> Findings:
     If no trial succeeds, the command is None, and every advice on the mesh command names the trials and the best of
     them; without trials it begins with "try". A finding on the unit alone is not tested.
     """
-    codes = {finding.code for finding in diagnosis.findings} - {"unit"}
+    codes = {finding.code for finding in diagnosis.findings} - {"unit"} - REMARKS
     if not codes:
         return diagnosis
     if source.unit is None and not diagnosis.measures["unit_said"]:
         source = replace(source, unit=diagnosis.measures["unit"])
     works, attempts, measures = None, dict[str, Findings | None](), diagnosis.measures
-    if not codes & BEYOND and measures["triangles"] <= MOST and likely_units(max(measures["size"])):
+    if not codes & BEYOND and measures["triangles"] <= MOST and SMALLEST <= max(measures["size"]) <= LARGEST:
         for how in ways(codes, wall_of(source) if measures["lumens"] else None):
             body = attempts[options(how)] = examined(source, how)
             if body is not None and body.clean:

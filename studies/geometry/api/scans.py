@@ -102,7 +102,7 @@ def scan(
     if nodes is None:
         check_surface(surface.points, surface.triangles, name)
         check_one_part(surface.triangles, name)
-        check_amount(signed_volume(surface.points, surface.triangles), name)
+        warn_if_small(signed_volume(surface.points, surface.triangles), name)
         none = np.empty((0, 4), np.int64)
         body = OrganMesh(recipe["name"], surface.points, surface.triangles, none, len(surface.points), {}, recipe)
         body = fill_mesh(body) if fill else body
@@ -117,7 +117,7 @@ def scan(
     grid = level_arrays(recipe, surface) if remeshing.on_shape else {}
     mesh = mesh_from(recipe, {"points": surface.points, "triangles": surface.triangles} | grid)
     mesh = replace(mesh, losses=with_file(mesh, surface))
-    check_amount(mesh.volume + mesh.lumen_volume, name)
+    warn_if_small(mesh.volume + mesh.lumen_volume, name)
     for sentence in warnings_of(mesh.losses, filled=remeshing.solid is not None):
         warnings.warn(f"{name}: {sentence}", stacklevel=2)
     return mesh
@@ -249,14 +249,13 @@ def in_metres(source: Source, content: Content) -> tuple[np.ndarray, np.ndarray]
 
 
 def check_remeshing(surface: RepairedSurface, how: Remeshing, name: str) -> None:
-    """Raise StudyError unless the surface is closed and encloses the volume of an organ (of a shell to be filled
-    nothing is asked), and for a length that is not finite or too small."""
+    """Raise StudyError unless the surface is closed and encloses a volume (of a shell to be filled nothing is asked),
+    and for a length that is not finite or too small."""
     if how.solid is None:
         left = len(border(surface.triangles))
         if left:
             raise StudyError(f"{name}: the surface is open at {left} edges; close the holes (--close-holes)")
         check_volume(surface.points, surface.triangles, name)
-        check_amount(signed_volume(surface.points, surface.triangles), name)
     if not 0 <= how.smooth < np.inf:
         raise StudyError(f"{name}: smoothing over {1e3 * how.smooth:g} mm asked for; give 0 or a few millimetres")
     if how.solid is not None and not 0 <= how.solid < np.inf:
@@ -265,9 +264,10 @@ def check_remeshing(surface: RepairedSurface, how: Remeshing, name: str) -> None
         raise StudyError(f"{name}: a wall of {1e3 * how.wall:g} mm asked for; give a thickness above 0")
 
 
-def check_amount(volume: float, name: str) -> None:
+def warn_if_small(volume: float, name: str) -> None:
     if abs(volume) < LEAST_VOLUME:
-        raise StudyError(
-            f"{name}: the surface encloses {1e6 * volume:.2g} mL, and no organ is smaller than 1 mL; correct the unit "
-            "or the scale, or choose another --part"
+        warnings.warn(
+            f"{name}: the surface encloses {1e6 * volume:.2g} mL, as organs of small animals do; if it is none, "
+            "correct the unit or the scale, or choose another --part",
+            stacklevel=3,
         )

@@ -7,14 +7,14 @@ from typing import Any
 
 import numpy as np
 
-from studies.geometry.doctor.findings import Finding, findings_of
+from studies.geometry.doctor.findings import REMARKS, Finding, findings_of
 from studies.geometry.doctor.measures import describe_springs, describe_surface, describe_tetrahedra
 from studies.geometry.files.checked_reading import weld
 from studies.geometry.files.content import Content, parts_in
 from studies.geometry.files.masks import is_mask
 from studies.geometry.files.opening import opened
 from studies.geometry.files.units import UNITS, Source, as_source, check_range, likely_units
-from studies.geometry.mesh.organ_mesh import OrganMesh, boundary_triangles
+from studies.geometry.mesh.organ_mesh import OrganMesh, boundary_triangles, turn_inverted
 
 TISSUE = 1800.0, 1060.0
 """Default shear modulus [Pa] and density [kg/m^3] for the time step: those of a liver."""
@@ -33,7 +33,7 @@ class Findings:
 
     @property
     def clean(self) -> bool:
-        return not self.findings
+        return all(finding.code in REMARKS for finding in self.findings)
 
     def to_dict(self) -> dict[str, Any]:
         """JSON-able form, as docs/meshes.md has it."""
@@ -94,11 +94,13 @@ def examine_cells(
     measures: dict[str, Any] = {"kind": "tetrahedra" if solid else "surface", "part_list": [], **file_measures}
     measures = {"bad_points": int((~np.isfinite(points).all(axis=1)).sum())} | measures
     if not measures["bad_points"]:
-        triangles = boundary_triangles(cells) if solid else cells
+        # Faces look outward only where volumes are positive.
+        turned = turn_inverted(points, cells.copy()) if solid else cells
+        triangles = boundary_triangles(turned) if solid else cells
         measures |= describe_surface(points, triangles)
         if solid:
-            measures |= describe_tetrahedra(points, cells)
+            measures |= describe_tetrahedra(points, cells, measures["volume"])
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            measures["springs"] = describe_springs(points, triangles, cells if solid else None, measures, tissue)
+            measures["springs"] = describe_springs(points, triangles, turned if solid else None, measures, tissue)
     return Findings(name, measures, findings_of(measures))

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from studies.geometry.files.units import FAR_AWAY, LEAST_VOLUME, UNITS, likely_units
+from studies.geometry.files.units import FAR_AWAY, LEAST_VOLUME, ORGAN, SMALLEST, UNITS, likely_units
 from studies.geometry.mesh.quality import MIN_DIHEDRAL
 
 POOR_TRIANGLE = 0.1
@@ -16,6 +16,9 @@ TRY, COMMAND = "try ", "organbench mesh"
 MESH = "organbench mesh --from FILE"
 REMESH = f"try {MESH} --nodes N: it makes a new, even surface"
 EXPORT = "export the file again from the program that made it"
+
+REMARKS = {"small"}
+"""Codes of findings that are no faults."""
 
 Measures = dict[str, Any]
 
@@ -44,7 +47,18 @@ def _unit_sentence(m: Measures) -> str:
 
 def _wrong_size(m: Measures) -> bool:
     side = max(m.get("size", [0.0]))
-    return m["unit_said"] and side > 0 and "m" not in likely_units(side)
+    return m["unit_said"] and side > 0 and not SMALLEST <= side <= ORGAN[1]
+
+
+def _small(m: Measures) -> bool:
+    little = max(m.get("size", [0.0])) < ORGAN[0] or (m["closed"] and 0 < abs(m["volume"]) < LEAST_VOLUME)
+    return m["unit_said"] and "size" in m and not _wrong_size(m) and little
+
+
+def _inverted_sentence(m: Measures) -> str:
+    if m["overlapping"]:
+        return f"{m['inverted_tetrahedra']} tetrahedra have zero or negative volume: they are inverted"
+    return f"{m['inverted_tetrahedra']} of {m['tetrahedra']} tetrahedra are numbered by the other hand"
 
 
 def _open_sentence(m: Measures) -> str:
@@ -80,9 +94,12 @@ RULES: tuple[tuple[str, str | Callable[[Measures], int], str | Callable[[Measure
     ),
     (
         "small",
-        lambda m: bool(m["unit_said"] and m.get("closed") and 0 < abs(m["volume"]) < LEAST_VOLUME),
-        lambda m: f"it encloses {1e6 * abs(m['volume']):.2g} mL, and no organ is smaller than 1 mL",
-        "give another --unit, or choose another --part",
+        _small,
+        lambda m: (
+            f"it is {1e3 * max(m['size']):.3g} mm long and encloses {1e6 * abs(m['volume']):.2g} mL, the size of an "
+            "organ of a small animal"
+        ),
+        "if it is none, give another --unit, or choose another --part",
     ),
     (
         "far_away",
@@ -138,8 +155,8 @@ RULES: tuple[tuple[str, str | Callable[[Measures], int], str | Callable[[Measure
     (
         "one_sided",
         lambda m: not m.get("two_sided", True),
-        "the surface has one side only, like a Moebius band: it cannot enclose anything",
-        EXPORT,
+        lambda m: f"the surface has one side only near {m['disagreeing_edges']} edges, like a Moebius band",
+        f"try {MESH} --nodes N: it leaves out the triangles there",
     ),
     (
         "disagreeing",
@@ -189,7 +206,7 @@ RULES: tuple[tuple[str, str | Callable[[Measures], int], str | Callable[[Measure
     (
         "inverted",
         "inverted_tetrahedra",
-        "{inverted_tetrahedra} tetrahedra have zero or negative volume: they are inverted",
+        _inverted_sentence,
         f"try {MESH}: it fills the surface again",
     ),
     (

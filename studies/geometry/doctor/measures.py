@@ -22,6 +22,8 @@ from studies.geometry.surface.repair import border, edge_pairs, encloses, larges
 
 MEASURED_BODY = 6000
 """Most nodes of a body for which the largest frequency of the springs is computed, which takes seconds."""
+OVERLAP = 1e-9
+"""Share of the volume below which tetrahedra only seem to overlap, by rounding."""
 RIM = 500
 """Most nodes of a border between which distances are measured; of more, every k-th is taken."""
 
@@ -131,16 +133,17 @@ def describe_size(points: np.ndarray, triangles: np.ndarray) -> dict[str, Any]:
     }
 
 
-def describe_tetrahedra(points: np.ndarray, tetrahedra: np.ndarray) -> dict[str, Any]:
-    """Numbers, volume [m^3] and quality of tetrahedra (k, 4) on points (n, 3) [m]; angles in degrees."""
-    ratio = tetrahedron_radius_ratio(points, tetrahedra)
+def describe_tetrahedra(points: np.ndarray, tetrahedra: np.ndarray, enclosed: float) -> dict[str, Any]:
+    """Numbers and quality of tetrahedra (k, 4) on points (n, 3) [m], and whether they overlap, so that their volumes
+    are together more than the volume `enclosed` [m^3] by their boundary; angles in degrees."""
+    ratio, volumes = tetrahedron_radius_ratio(points, tetrahedra), tetrahedron_volumes(points, tetrahedra)
     distinct = np.unique(np.sort(tetrahedra, axis=1), axis=0)
     return {
         "nodes": len(points),
         "tetrahedra": len(tetrahedra),
         "duplicate_tetrahedra": len(tetrahedra) - len(distinct),
-        "inverted_tetrahedra": int((tetrahedron_volumes(points, tetrahedra) <= 0).sum()),
-        "volume": float(tetrahedron_volumes(points, tetrahedra).sum()),
+        "inverted_tetrahedra": int((volumes <= 0).sum()),
+        "overlapping": bool(np.abs(volumes).sum() > (1 + OVERLAP) * enclosed),
         "tetrahedron_radius_ratio": spread(ratio),
         "dihedral_angle": spread(dihedral_angles(points, tetrahedra).min(axis=1)),
         "worst_tetrahedron": int(ratio.argmin()),

@@ -5,7 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from studies.base.errors import StudyError
-from studies.geometry.mesh.organ_mesh import Surface, compact, connected, signed_volume, triangle_areas
+from studies.geometry.mesh.organ_mesh import Surface, compact, connected, counted_edges, signed_volume, triangle_areas
+
+TWISTED = 0.01
+"""Largest share of triangles with a neighbour of the other orientation that are replaced in a one-sided surface."""
 
 FILLED = 0.005
 """Share of the volume that an outer surface encloses up to which lumens in it are filled: the bound of our bodies."""
@@ -29,10 +32,11 @@ class RepairedSurface:
 
 def mend(points: np.ndarray, triangles: np.ndarray, name: str, holes: bool = False) -> RepairedSurface:
     """The largest part of a welded surface of points (n, 3) [m] and triangles (t, 3), without duplicate and collapsed
-    triangles, flipped to agree with their neighbours and to look outward; and its lumens.
+    triangles and open sheets that hang on it, flipped to agree with their neighbours and to look outward; and its
+    lumens.
 
     holes: whether each border is closed by a fan of triangles over the mean of its nodes. name: for messages. Raises
-    StudyError if nothing is left, or for a surface with one side only.
+    StudyError if nothing is left, or for a surface with one side only, unless that is a matter of few triangles.
     """
     remarks: list[str] = []
     whole = len(triangles)
@@ -41,11 +45,22 @@ def mend(points: np.ndarray, triangles: np.ndarray, name: str, holes: bool = Fal
         remarks.append(f"{whole - len(triangles)} triangles that were doubled or had no three corners are left out")
     if not len(triangles):
         raise StudyError(f"{name}: no usable triangle is left; export the surface again")
+    triangles, fins = without_fins(points, triangles)
+    if len(fins):
+        remarks.append(
+            f"{len(fins)} triangles of open sheets that hang on the surface are left out, {near(points, fins)}"
+        )
     parts = part_of(triangles)
     keep = largest(points, triangles, parts)
     others = [triangles[parts == k] for k in range(int(parts.max()) + 1) if k != keep]
     area = triangle_areas(points, triangles).sum()
-    triangles, turned = oriented(triangles[parts == keep], name)
+    triangles = triangles[parts == keep]
+    try:
+        triangles, turned = oriented(triangles, name)
+    except StudyError:
+        points, triangles, bad = without_twists(points, triangles, name)
+        turned = 0
+        remarks.append(f"{len(bad)} triangles where it has one side only are replaced by lids, {near(points, bad)}")
     outer = signed_volume(points, triangles)
     volumes = [0.0 if len(border(part)) else np.sign(outer) * signed_volume(points, part) for part in others]
     rows = list(zip(others, volumes, strict=True))
@@ -83,6 +98,44 @@ def encloses(points: np.ndarray, triangles: np.ndarray, part: np.ndarray) -> boo
     below = lengths[0] * lengths[1] * lengths[2] + sum(x * y for x, y in zip(cosines, lengths, strict=True))
     angles = np.arctan2(np.einsum("ij,ij->i", a, np.cross(b, c)), below)
     return bool(abs(angles.sum()) > np.pi)
+
+
+def near(points: np.ndarray, triangles: np.ndarray) -> str:
+    x, y, z = 1e3 * points[triangles].mean(axis=(0, 1))
+    return f"near ({x:.1f}, {y:.1f}, {z:.1f}) mm"
+
+
+def without_fins(points: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The triangles (t, 3) without open sheets that hang at edges of more than two triangles, and these sheets (s, 3).
+
+    A sheet ends at such edges. Nothing is left out unless the largest sheet is closed by itself.
+    """
+    half = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+    _, edge, count = np.unique(half, axis=0, return_inverse=True, return_counts=True)
+    if count.max() <= 2:
+        return triangles, triangles[:0]
+    order, count = np.argsort(edge, kind="stable"), count[edge]
+    sheet = connected(order[count[order] == 2].reshape(-1, 2) // 3, len(triangles))
+    closed = [bool((counted_edges(triangles[sheet == k])[1] == 2).all()) for k in range(int(sheet.max()) + 1)]
+    if not closed[largest(points, triangles, sheet)]:
+        return triangles, triangles[:0]
+    hanging = ~np.array(closed)[sheet] & np.isin(sheet, sheet[(count > 2).reshape(-1, 3).any(axis=1)])
+    return triangles[~hanging], triangles[hanging]
+
+
+def without_twists(points: np.ndarray, triangles: np.ndarray, name: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """A one-sided surface with lids in place of the triangles whose orientation disagrees with a neighbour's: points,
+    triangles (t, 3), and those left out (s, 3). Raises StudyError for an open surface, or if they are over TWISTED of
+    all triangles."""
+    pairs, agree = edge_pairs(triangles)
+    bad = np.zeros(len(triangles), bool)
+    bad[pairs[~agree]] = True
+    if bad.mean() > TWISTED or (counted_edges(triangles)[1] == 1).any():
+        raise StudyError(f"{name}: the surface has only one side, like a Moebius band; export it again")
+    rest = triangles[~bad]
+    parts = part_of(rest)
+    points, closed, _ = without_holes(points, rest[parts == largest(points, rest, parts)])
+    return points, closed, triangles[bad]
 
 
 def without_repeats(triangles: np.ndarray) -> np.ndarray:

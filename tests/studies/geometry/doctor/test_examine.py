@@ -150,6 +150,18 @@ def test_bodies_are_examined_too(tmp_path, livers):
     corner = body.tetrahedra[inner].max()
     others = np.setdiff1d(body.tetrahedra[inner], corner)
     flat[corner] = flat[others].mean(axis=0) + 0.01 * (flat[corner] - flat[others].mean(axis=0))
+    other = np.where(np.arange(len(body.tetrahedra))[:, None] % 2, body.tetrahedra[:, [0, 2, 1, 3]], body.tetrahedra)
+    meshio.write_points_cells(path, body.points, [("tetra", other)])
+    report = examine(path)
+    (finding,) = report.findings
+    assert finding.sentence == f"{finding.count} of {len(other)} tetrahedra are numbered by the other hand"
+    assert report.measures["volume"] == pytest.approx(body.volume, rel=1e-12)
+    folded = body.points.copy()
+    folded[body.tetrahedra[0, 3]] += 3 * (
+        body.points[body.tetrahedra[0, :3]].mean(axis=0) - folded[body.tetrahedra[0, 3]]
+    )
+    meshio.write_points_cells(path, folded, [("tetra", body.tetrahedra)])
+    assert "have zero or negative volume" in {f.code: f.sentence for f in examine(path).findings}["inverted"]
     for points, cells, code in (
         (body.points, bad, "inverted"),
         (body.points, np.vstack([body.tetrahedra, body.tetrahedra[:1]]), "duplicate_tetrahedra"),

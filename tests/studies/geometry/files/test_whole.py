@@ -9,7 +9,7 @@ import pytest
 from studies.base.errors import StudyError
 from studies.geometry import read_mesh
 from studies.geometry.doctor.examine import examine
-from studies.geometry.files import formats
+from studies.geometry.files import opening
 from studies.geometry.files.opening import opened
 from studies.geometry.files.units import Source
 from studies.geometry.mesh.organ_mesh import signed_volume, tetrahedron_volumes
@@ -161,7 +161,7 @@ def test_fewer_cells_than_the_file_states_are_refused(tmp_path, monkeypatch, suf
 
     if suffix in ("inp", "MSH"):
         return  # their readers count
-    monkeypatch.setitem(formats.READERS, f".{suffix}", (all_but_one,))
+    monkeypatch.setitem(opening.READERS, f".{suffix}", (all_but_one,))
     with pytest.raises(StudyError, match=rf"states {len(cells[0][1])} cells, and {len(cells[0][1]) - 1} can be read"):
         volume_in(path)
 

@@ -46,6 +46,38 @@ def test_moebius_bands_are_refused():
     assert oriented(box()[1], "box")[1] == 0
 
 
+def one_sided(loop):
+    """A band of five triangles whose border is this loop of five nodes (n,)."""
+    nodes = loop[[0, 3, 1, 4, 2]]
+    return np.array([nodes[[k, (k + 1) % 5, (k + 2) % 5]] for k in range(5)])
+
+
+def test_a_strip_that_hangs_on_the_surface_is_left_out():
+    points, faces = split(*box(), times=2)
+    strip = np.concatenate([faces[0][:2], len(points) + np.arange(3)])
+    more = np.vstack([points, points[faces[0][0]] + 0.1 * np.eye(3)])
+    surface = mend(more, np.vstack([faces, one_sided(strip)]), "box")
+    assert (surface.points == points).all() and (surface.triangles == faces).all()
+    assert len(surface.remarks) == 1 and surface.remarks[0].startswith("5 triangles of open sheets that hang on")
+    wall = np.vstack([faces, [faces[0], faces[1]]])  # doubled triangles are no sheet
+    assert len(mend(points, wall, "box").triangles) == len(faces)
+
+
+def test_a_few_triangles_that_make_it_one_sided_are_replaced():
+    points, faces = split(*box(), times=4)
+    node, at = faces[0, 0], np.flatnonzero((faces == faces[0, 0]).any(axis=1))
+    follows = dict(np.array([np.roll(face, -int(np.argmax(face == node)))[1:] for face in faces[at]]).tolist())
+    loop = [node, next(iter(follows))]  # around three triangles
+    while len(loop) < 5:
+        loop.append(follows[loop[-1]])
+    rest = faces[~np.isin(faces, loop).all(axis=1)]
+    assert len(rest) == len(faces) - 3
+    surface = mend(points, np.vstack([rest, one_sided(np.array(loop))]), "box")
+    assert signed_volume(surface.points, surface.triangles) == pytest.approx(1.0, abs=1e-3)
+    assert not len(border(surface.triangles))
+    assert "triangles where it has one side only are replaced by lids, near (" in surface.remarks[0]
+
+
 @pytest.mark.parametrize("inverted", [False, True])
 def test_only_the_largest_part_stays_with_its_lumen(inverted):
     speck, lumen = box((3, 3, 3), (3.1, 3.1, 3.1)), box((0.2, 0.2, 0.2), (0.6, 0.6, 0.6))
