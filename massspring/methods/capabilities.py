@@ -44,6 +44,9 @@ class Capabilities:
     elements, whose compliance leaves no residual there."""
     conditionally_stable: bool = True
     """Whether steps beyond the stability limit diverge; if not, only accuracy limits the step."""
+    converged: Support = True
+    """Whether the answer at rest is the same for any order of nodes and elements and tends to one limit with the step
+    (tests/massspring/methods/test_converged.py)."""
     triangle_springs: Support = True
     """Bodies with triangle springs (membranes)."""
     prestress: Support = No("it does not start with the pressures that balance these springs at rest")

@@ -97,6 +97,7 @@ class Xpbd(Method):
     capabilities: ClassVar[Capabilities] = Capabilities(
         "tetrahedra",
         "full",
+        converged=No("its sweeps over volumes stop before they agree"),
         thin_probes=No("it does not correct the volumes again after a contact has changed them"),
     )
 
@@ -108,7 +109,7 @@ class Xpbd(Method):
         if not 0.0 <= self.compliance < float("inf"):
             raise MassSpringError(f"xpbd's compliance is {self.compliance} 1/Pa; it must be 0 or positive, and finite")
         if self.volumes == "whole":
-            object.__setattr__(self, "capabilities", replace(self.capabilities, keeps="whole"))
+            object.__setattr__(self, "capabilities", replace(self.capabilities, keeps="whole", converged=True))
 
     def start(self, body: Body, attachments: tuple[Attachment, ...] = (), v: np.ndarray | None = None) -> State:
         """The body at rest, or with velocities `v` (n, 3) [m/s], with its cells at rest."""

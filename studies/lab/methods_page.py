@@ -10,6 +10,7 @@ from massspring import LITERATURE, METHODS, Method, Plane
 from massspring.methods import VARIANTS
 from massspring.methods.capabilities import No
 from massspring.world.obstacles import Surroundings
+from studies.metrics.cells import UNCONVERGED_MARK
 
 PAGE = Path("docs/methods.md")
 AROUND: Mapping[str, Surroundings] = {
@@ -45,7 +46,8 @@ def words(method: Method) -> str:
 
 def claims(method: Method) -> list[str]:
     tolerance = "–" if method.volume_tol is None else f"{method.volume_tol:.0e}"
-    return [words(method), str(method.order), tolerance, answer(method.conserves_angular_momentum), summary(method)]
+    name = words(method) + ("" if method.capabilities.converged else f" {UNCONVERGED_MARK}")
+    return [name, str(method.order), tolerance, answer(method.conserves_angular_momentum), summary(method)]
 
 
 def capabilities(method: Method) -> list[str]:

@@ -6,6 +6,12 @@ MISSING = "–"
 UNRESOLVED_MARK = "†"
 """Mark of an error that is less than ten times the uncertainty of the reference."""
 UNRESOLVED_NOTE = f"{UNRESOLVED_MARK} unresolved: the uncertainty of the reference is more than a tenth of this error"
+UNCONVERGED_MARK = "§"
+"""Mark of a method without `Capabilities.converged`."""
+UNCONVERGED_NOTE = (
+    f"{UNCONVERGED_MARK} not converged: the answer depends on the step and on the order of elements, which ± does not "
+    "contain"
+)
 MINUS = "−"
 
 

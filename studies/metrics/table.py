@@ -1,13 +1,15 @@
 """Tables with one row per case: its settings, its status, and the metrics of the study with the uncertainty of their
 reference."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import pandas as pd
 
+from massspring.methods.capabilities import No
 from studies.base.errors import StudyError
 from studies.base.lookup import lookup
+from studies.metrics.cells import UNCONVERGED_MARK
 from studies.metrics.metric import Metric
 from studies.metrics.metrics import METRICS
 from studies.metrics.run import Run
@@ -18,6 +20,8 @@ Row = dict[str, Any]
 """Column name -> value."""
 OFF_SHAPE = "reference off shape [%]"
 """Column with the distance of the reference's finest mesh from the true shape, over the size."""
+UNCONVERGED = "not converged"
+"""Column with the reason why the answer of the method depends on the step and on the order of elements."""
 UNRESOLVED = "doubtful"
 """Column with the metrics whose value is less than ten times the uncertainty of the reference."""
 
@@ -57,9 +61,15 @@ def frame_of(rows: Sequence[Row]) -> pd.DataFrame:
     return frame.drop(columns=unknown)
 
 
+def marked(row: Mapping[Any, Any]) -> str:
+    """The method of a row, with UNCONVERGED_MARK if it is not converged."""
+    return f"{row['method']} {UNCONVERGED_MARK}" if row.get(UNCONVERGED) else row["method"]
+
+
 def row_of(run: Run, metrics: Sequence[Metric]) -> Row:
     """Settings, status and metrics of a run, with uncertainties."""
     case, attributes = run.case, run.record.attributes
+    converged = case.method.capabilities.converged
     row: Row = {
         "scene": case.scene.name,
         "body": case.body.series,
@@ -72,6 +82,7 @@ def row_of(run: Run, metrics: Sequence[Metric]) -> Row:
         "status": str(run.record.status),
         "recipe": recipe_text(case),
         "reference": "" if run.reference is None else run.reference.source,
+        UNCONVERGED: converged.because if isinstance(converged, No) else "",
         OFF_SHAPE: float("nan") if run.reference is None else 100.0 * run.reference.shape_error,
     }
     for entry in metrics:

@@ -4,10 +4,10 @@ each rung of the ladder of bodies."""
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from typing import Any, NamedTuple
 
-from studies.metrics.cells import MISSING, UNRESOLVED_MARK, UNRESOLVED_NOTE, value_cell
+from studies.metrics.cells import MISSING, UNCONVERGED_NOTE, UNRESOLVED_MARK, UNRESOLVED_NOTE, value_cell
 from studies.metrics.judged import Judged, Measured, cheapest, judged, nearest, over_meshes
 from studies.metrics.run import Run
-from studies.metrics.table import UNRESOLVED, study_table
+from studies.metrics.table import UNCONVERGED, UNRESOLVED, marked, study_table
 from studies.metrics.wish import Wish, usual_wish
 from studies.runs.recipe_text import body_words
 from studies.scene.scene import Scene
@@ -31,9 +31,11 @@ def results_of(runs: Sequence[Run]) -> str:
     ]
     for row in rows.to_dict("records"):
         cells = [_cell(row, name) for name in SUMMARY_HEADS]
-        lines.append(f"| {row['scene']} | {row['body']} | {row['method']} | " + " | ".join(cells) + " |")
+        lines.append(f"| {row['scene']} | {row['body']} | {marked(row)} | " + " | ".join(cells) + " |")
     if any(UNRESOLVED_MARK in line for line in lines):
         lines += ["", UNRESOLVED_NOTE]
+    if rows[UNCONVERGED].any():
+        lines += ["", UNCONVERGED_NOTE]
     return "\n".join(lines)
 
 

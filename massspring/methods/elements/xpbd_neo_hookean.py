@@ -99,6 +99,7 @@ class XpbdNeoHookean(Method):
     capabilities: ClassVar[Capabilities] = Capabilities(
         "elements",
         "penalty",
+        converged=No("its sweeps over tetrahedra stop before they agree"),
         prestress=True,
         point_volumes=No("its tetrahedra are linear"),
         thin_probes=No("it does not correct its constraints again after a contact has changed them"),

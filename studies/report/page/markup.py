@@ -12,7 +12,7 @@ from studies.base.counting import heading, readable
 from studies.meshing.bounds import REFERENCE_SHAPE
 from studies.metrics.cells import MISSING, plain, value_cell
 from studies.metrics.metrics import METRICS
-from studies.metrics.table import OFF_SHAPE, UNRESOLVED
+from studies.metrics.table import OFF_SHAPE, UNRESOLVED, marked
 from studies.report.page.svg import inline
 
 ASSETS = Path(__file__).parent / "assets"
@@ -101,7 +101,7 @@ def _names(row: Mapping[str, Any], cases: Mapping[str, Any]) -> Entry:
         "title": None if case is None else case["title"],
         "scene": readable(row["scene"]),
         "marks": [*marks, row["status"]] if row["status"] != "ok" else marks,
-        "lines": (f"{row['body']}, {row['nodes']} nodes", row["method"]),
+        "lines": (f"{row['body']}, {row['nodes']} nodes", marked(row)),
         "order": f"{row['scene']} {row['body']} {row['nodes']} {row['method']}",
     }
 

@@ -2,10 +2,15 @@
 
 import pytest
 
+from massspring import ImplicitVolume, Xpbd
 from studies.cli.commands import table
-from studies.metrics.cells import value_cell
+from studies.metrics.cells import UNCONVERGED_NOTE, value_cell
 from studies.metrics.metrics import METRICS
-from studies.metrics.table import UNRESOLVED
+from studies.metrics.table import UNRESOLVED, row_of
+from studies.report.page.markup import table as page_table
+from studies.report.summary import results_of
+from studies.scene.library import BALL_CLAMPED
+from tests.studies.plots.made_up import run
 
 CHOSEN = [metric for metric in METRICS if metric.name in ("volume_worst", "force_end", "mean_error", "min_j")]
 
@@ -70,3 +75,18 @@ def test_the_status_is_a_column_where_a_run_did_not_end_well(capsys):
     table.draw([row(), row(method="penalty", status="diverged")], CHOSEN, False)
     out = capsys.readouterr().out.splitlines()
     assert out[-1].split()[:2] == ["penalty", "diverged"] and out[-2].split()[:2] == ["free", "ok"]
+
+
+def test_a_method_that_does_not_converge_is_marked_in_every_table(capsys):
+    """By what the method says of itself; with a line that says what the mark means."""
+    ours, theirs = (run(BALL_CLAMPED, method=method, error=3.0) for method in (ImplicitVolume(), Xpbd()))
+    rows = [row_of(one, CHOSEN) for one in (ours, theirs)]
+    table.draw(rows, CHOSEN, False)
+    printed = capsys.readouterr().out
+    summary = results_of([ours, theirs])
+    for text in (printed, summary):
+        assert "xpbd §" in text and UNCONVERGED_NOTE in text and "implicit_volume §" not in text
+    table.draw(rows[:1], CHOSEN, False)
+    assert "§" not in capsys.readouterr().out and "§" not in results_of([ours])
+    shown = page_table([{**one, "case": "0", "study": "tiny"} for one in rows], {})["rows"]
+    assert [one["lines"][1] for one in shown] == ["implicit_volume", "xpbd §"]
