@@ -10,7 +10,6 @@ from massspring import LITERATURE, METHODS, Method, Plane
 from massspring.methods import VARIANTS
 from massspring.methods.capabilities import No
 from massspring.world.obstacles import Surroundings
-from studies.metrics.cells import UNCONVERGED_MARK
 
 PAGE = Path("docs/methods.md")
 AROUND: Mapping[str, Surroundings] = {
@@ -46,7 +45,7 @@ def words(method: Method) -> str:
 
 def claims(method: Method) -> list[str]:
     tolerance = "–" if method.volume_tol is None else f"{method.volume_tol:.0e}"
-    name = words(method) + ("" if method.capabilities.converged else f" {UNCONVERGED_MARK}")
+    name = words(method) + ("" if method.capabilities.converged else " §")
     return [name, str(method.order), tolerance, answer(method.conserves_angular_momentum), summary(method)]
 
 
