@@ -10,6 +10,7 @@ import numpy as np
 SAME = re.IGNORECASE | re.MULTILINE
 NODES = re.compile(rb"^\*NODE[ \t]*(?:,[^\n]*)?\n((?:[^*][^\n]*(?:\n|\Z))*)", SAME)
 ELEMENTS = re.compile(rb"^\*ELEMENT[ \t]*,[^\n]*\n((?:[^*][^\n]*(?:\n|\Z))*)", SAME)
+TYPE = re.compile(rb"^\*ELEMENT\b[^\n]*", SAME)
 PART = re.compile(rb"^\*PART\b[^\n]*\n(.*?)^\*END PART", SAME | re.DOTALL)
 INSTANCE = re.compile(rb"^\*INSTANCE\b[^\n]*\n(\s*[-+.\d])?", SAME)
 
@@ -36,7 +37,9 @@ def read_part(text: bytes, path: Path) -> meshio.Mesh:
     numbers = [line.split(b",")[0].strip() for block in blocks for line in block.splitlines()]
     if len(set(numbers)) < len(numbers):
         raise meshio.ReadError("two of its nodes have the same number; write each part as a file")
-    path.write_bytes(b"*NODE\n" + b"".join(blocks) + NODES.sub(b"", text))
+    # meshio knows element types in capitals alone.
+    elements = TYPE.sub(lambda found: found[0].upper(), NODES.sub(b"", text))
+    path.write_bytes(b"*NODE\n" + b"".join(blocks) + elements)
     mesh = meshio.read(path)
     # A line that ends with a comma goes on in the next.
     stated = sum(len(re.findall(rb"[^,\s]\s*(?:\n|\Z)", block)) for block in ELEMENTS.findall(text))

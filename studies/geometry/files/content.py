@@ -112,8 +112,13 @@ def content_of(raw: meshio.Mesh, name: str) -> tuple[Content, str | None]:
     tetrahedra = np.concatenate([np.empty((0, 4), np.int64), *(cells for kind, cells in solid if kind == "tetra")])
     if any(kind != "tetra" for kind, _ in solid):
         tetrahedra, flat = tetrahedra[:0], boundary_of(points, solid)
+    triangles, remarks = np.concatenate(flat), [FLAT] if curved else []
+    if len(tetrahedra) and not np.isin(triangles, tetrahedra).all():
+        same = coincident(points) if np.isfinite(points).all() else np.arange(len(points))
+        alone = int((~np.isin(same[triangles], same[tetrahedra])).any(axis=1).sum())
+        remarks += [f"{alone:,} triangles that bound no tetrahedron are left out"] if alone else []
     data = {key: np.asarray(values) for key, values in raw.point_data.items()}
-    return Content(points, np.concatenate(flat), tetrahedra, data), FLAT if curved else None
+    return Content(points, triangles, tetrahedra, data), "; ".join(remarks) or None
 
 
 def boundary_of(points: np.ndarray, solid: list[tuple[str, np.ndarray]]) -> list[np.ndarray]:

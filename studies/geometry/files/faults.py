@@ -54,10 +54,9 @@ PROMISES = {
 LEAST_BYTES = {".vtu": 1e-3, ".vtp": 1e-3}
 """Fewest bytes of an element, because zlib packs up to a thousand to one; 2 in the other formats."""
 ENDS = {
-    ".vtu": (b"<VTKFile", b"</VTKFile>"),
-    ".vtp": (b"<VTKFile", b"</VTKFile>"),
-    ".msh": (b"$MeshFormat", b"$EndElements"),
-    ".stl": (b"solid", b"endsolid"),
+    ".vtu": {b"<VTKFile": b"</VTKFile>"},
+    ".vtp": {b"<VTKFile": b"</VTKFile>"},
+    ".msh": {b"$MeshFormat": b"$EndElements", b"$NOD": b"$ENDELM"},
 }
 """Text near the beginning of a file of a format, and near the end of a complete one."""
 
@@ -130,8 +129,8 @@ def reason_of(path: Path, error: BaseException, output: str) -> str:
     with open(path, "rb") as file:
         head = file.read(HEAD)
     is_text_stl = path.suffix.lower() == ".stl" and is_ascii_stl(head)
-    start, end = ENDS.get(path.suffix.lower(), (b"", b""))
-    if start and start in head and (path.suffix.lower() != ".stl" or is_text_stl) and end not in tail(path):
+    ends = {b"": b"endsolid"} if is_text_stl else ENDS.get(path.suffix.lower(), {})
+    if any(start in head and end not in tail(path).replace(b"ENDSOLID", b"endsolid") for start, end in ends.items()):
         return "it is cut short: its end is missing"
     comma = comma_of(path.read_bytes()) if is_text_stl else ""
     said = sentence_in(output) or (sentence_in(str(error)) if "ReadError" in type(error).__name__ else "")

@@ -84,7 +84,7 @@ def abaqus(*parts, end=""):
         rows = [f"{k + 1}, {', '.join(map(str, row + 1))}\n" for k, row in enumerate(cells)]
         half = len(nodes) // 2  # in two blocks, with a comment between the lines of one
         text += f"*Part, name=p{number}\n*Node\n{''.join(nodes[:half])}*NODE, nset=b\n** rest\n{''.join(nodes[half:])}"
-        text += f"*Element, type=C3D4\n{''.join(rows)}*End Part\n"
+        text += f"*Element, type=c3d4\n{''.join(rows)}*End Part\n"
     return text + end
 
 
@@ -125,6 +125,13 @@ FILES = {
 @pytest.mark.parametrize("name", FILES)
 def test_what_other_programs_write_is_read_whole(tmp_path, name):
     assert volume_in(written(tmp_path / name, FILES[name])) == pytest.approx(VOLUME, rel=1e-6)
+
+
+def test_a_surface_beside_tetrahedra_is_named(tmp_path):
+    cells = [("tetra", TETRAHEDRA), ("triangle", np.array([[0, 4, 6], [8, 9, 10]]))]
+    meshio.write_points_cells(tmp_path / "two.vtu", np.vstack([CORNERS, CORNERS[:3] + 90]), cells)
+    with pytest.warns(UserWarning, match="1 triangles that bound no tetrahedron are left out"):
+        opened(Source(tmp_path / "two.vtu"))
 
 
 def test_curved_cells_are_announced(tmp_path):
