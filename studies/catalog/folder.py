@@ -16,7 +16,7 @@ from studies.scene.kind import has_wall
 from studies.scene.placing import along, press_times, scaled
 from studies.scene.proposal import Proposal, proposal
 from studies.scene.scene import ForceOutput, Held, Lumen, Organ, ReferencePlan, Scene
-from studies.scene.scene_file import python_name
+from studies.scene.scene_file import organ_options, python_name
 from studies.scene.tissues import LIVER, Tissue
 from studies.store.paths import readable
 
@@ -65,34 +65,38 @@ def _placed(path: Path, unit: str | None, name: str) -> Placed:
         try:
             source = Source(path.absolute(), unit)
             mesh = geometry.scan(source, NODES, fill=False)
-            scene = placed_scene(name, replace(source, unit=mesh.recipe["unit"]), proposal(mesh))
+            source = replace(source, unit=mesh.recipe["unit"])
+            scene = placed_scene(name, Organ("file", organ_options(source, {})), proposal(mesh))
         except StudyError as error:
             return Placed(path, None, (str(error),))
     return Placed(path, scene, tuple(str(warning.message) for warning in remarks))
 
 
 def placed_scene(
-    name: str, source: Source, placing: Proposal, tissue: Tissue = LIVER, wall: float | None = None
+    name: str,
+    organ: Organ,
+    placing: Proposal,
+    tissue: Tissue = LIVER,
+    end: float = PRESSED * DURATION,
+    checkpoints: int = CHECKPOINTS,
+    frames: int = FRAMES,
 ) -> Scene:
-    """The scene of a body from a file: held at an end, palpated as proposed by a probe in proportion to its size.
-
-    wall: thickness [m] of the wall of a hollow organ, whose content is closed.
-    """
+    """The scene of a body from a file: held at an end, palpated as proposed by a probe in proportion to its size until
+    `end` [s]. The content of a hollow organ is closed."""
     radius, depth = (round(share * placing.sides[0], 4) for share in (RADIUS, DEPTH))
-    point, outward, end = placing.palpation.point, placing.palpation.normal, PRESSED * DURATION
+    point, outward = placing.palpation.point, placing.palpation.normal
     inward = scaled(outward, -1.0)
     path = Trajectory((0.0, end), ((0.0, 0.0, 0.0), scaled(inward, depth + GAP)))
     pressed = f"a probe of {1e3 * radius:.3g} mm radius pushed in by {1e3 * depth:.3g} mm"
-    given = {"path": str(source.path), "unit": source.unit, "remesh": True}
     return Scene(
         name=name,
         title=f"{name}: held at {placing.held_where}, {pressed}",
-        organ=Organ("file", given if wall is None else given | {"wall": wall}),
-        lumen=None if wall is None else Lumen(),
+        organ=organ,
+        lumen=Lumen() if "wall" in organ.parameters else None,
         tissue=tissue,
         duration=DURATION,
-        frames=FRAMES,
-        checkpoints=press_times(0.0, end, CHECKPOINTS, DURATION),
+        frames=frames,
+        checkpoints=press_times(0.0, end, checkpoints, DURATION),
         obstacles=(Sphere(along(point, outward, radius + GAP), radius, path),),
         held=(Held("end", placing.hold),),
         probed=ForceOutput("obstacle", 0, inward),

@@ -47,24 +47,25 @@ SCENE = Scene(
     reference=ReferencePlan(),
 )
 CASES = (
-    # One volume, which the paper keeps: quick, but inaccurate (docs/findings.md, the paper's body).
-    Case(SCENE, TetrahedralBody({nodes}), ImplicitVolume(), recorded=("surface",)),
-{recommended})
+{recommended}    # {kept}: quick, but inaccurate (docs/findings.md, the paper's body).
+    Case(SCENE, TetrahedralBody({nodes}), ImplicitVolume(), timed=True, recorded=("surface",)),
+)
 CHARTS = (
     Chart("volume.png", "studies.plots.volume_history:draw"),
     Chart("force.png", "studies.plots.force_path:draw"),
     Chart("accuracy.png", "studies.plots.accuracy:draw"),
 )
 COLUMNS = ("force_end", "mean_error", "shape_error", "shape_volume", "volume_worst")
-STUDY = Study("{name}", "How near are these bodies to the reference?", CASES, CHARTS, COLUMNS)
+STUDY = Study("{name}", "{missing}How near are these bodies to the reference?", CASES, CHARTS, COLUMNS)
 '''
-RECOMMENDED = """    # What `organbench advise` recommends. Its worst errors in {alike}:
-    # {errors}.
+RECOMMENDED = """    # {promise}.
+    # Shape of this organ: {shape}.
     Case(
         SCENE,
         {body},
         ImplicitVolume(),
         dt_fraction={dt_fraction:g},
+        timed=True,
         recorded=("surface",),
     ),
 """
@@ -72,16 +73,17 @@ RECOMMENDED = """    # What `organbench advise` recommends. Its worst errors in 
 
 @dataclass(frozen=True)
 class Recommended:
-    """The second body of a scene file."""
+    """The first body of a scene file."""
 
     body: str
     """As Python: "QuadraticBody(nodes=794)"."""
     dt_fraction: float
     """Time step over the stability limit."""
-    alike: tuple[str, ...]
-    """Scenes in which it was measured."""
-    errors: str
-    """The worst there, in words."""
+    promise: str
+    """Its errors on random organs, in words."""
+    shape: str
+    """How far it is from the shape of this organ, in words."""
+    keeps_shape: bool
 
 
 def scene_text(
@@ -95,17 +97,17 @@ def scene_text(
     """A Python file, in `folder`, that defines SCENE and STUDY for the organ in a file.
 
     organ: parameters of Organ("file"), see organ_options; tissue: a name of TISSUES; nodes: of the body of one volume;
-    recommended: a second body, None if none is known to be better."""
+    recommended: a better body, None if none is known."""
     path = Path(str(organ["path"]))
     given = {key: json.dumps(value) if isinstance(value, str) else repr(value) for key, value in organ.items()}
     entries = ", ".join(f'"{key}": {text}' for key, text in (given | {"path": "str(FILE)"}).items())
     radius, depth = (round(share * proposal.sides[0], 4) for share in (RADIUS, DEPTH))
-    second, hollow = "", "wall" in organ
+    second, missing, hollow = "", "", "wall" in organ
     bodies = {"TetrahedralBody"} | ({"Lumen"} if hollow else set())
     if recommended is not None:
-        names = " and ".join(recommended.alike)
         bodies.add(recommended.body.split("(")[0])
-        second = RECOMMENDED.format(**vars(recommended) | {"alike": names})
+        second = RECOMMENDED.format(**vars(recommended))
+        missing = "" if recommended.keeps_shape else f"Part of the shape is missing: {recommended.shape}. "
     return TEXT.format(
         name=python_name(stem_of(path)),
         where=proposal.held_where,
@@ -125,6 +127,8 @@ def scene_text(
             (f"{type(proposal.hold).__name__}(", ")")
         ),
         nodes=nodes,
+        missing=missing,
+        kept="Wall and content as two volumes" if hollow else "One volume, which the paper keeps",
         bodies=", ".join(sorted(bodies)),
         recommended=second,
     )

@@ -1,5 +1,6 @@
 """`organbench place`: from a scan to a scene, by rule."""
 
+import warnings
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
@@ -14,19 +15,26 @@ from studies.cli.mesh_files import MM, LongestSide, Part, Scale, Unit, Yes, in_m
 from studies.cli.terminal import say, warn
 from studies.geometry import BallRegion, scan
 from studies.geometry.files.units import stem_of
-from studies.metrics.cells import value_cell
+from studies.meshing.bounds import SHAPE, SHAPE_VOLUME
+from studies.meshing.quadratic_mesh import QuadraticMesh
+from studies.meshing.rest_surface import rest_surfaces
+from studies.meshing.true_surface import ShapeErrors, shape_errors
 from studies.plots.place import draw_placing
+from studies.runs.case import Case
+from studies.runs.prepare import mesh_of
 from studies.scene.chosen_place import RADIUS, SIDES, place_of
 from studies.scene.proposal import Proposal, proposal
-from studies.scene.scene import ReferencePlan
+from studies.scene.scene import Organ, ReferencePlan, Scene
 from studies.scene.scene_file import Recommended, organ_options, python_name, scene_text
 from studies.scene.tissues import TISSUES, tissue_named
 from studies.sweep.estimate import SECONDS_PER_UNKNOWN
-from studies.tools.advise.answer import Advice, advise
 from studies.tools.advise.campaign import shipped
+from studies.tools.advise.population import Unseen, supported
 from studies.tools.advise.words import body_in_python
 
 NODES = 550
+FINER, TRIES = 1.5, 3
+"""Ratio of the numbers of nodes of successive bodies, and how many are tried, until one keeps the shape."""
 MESHING = 60.0
 """Seconds for the meshes of the same spleen and liver: 26 and 51, and those of the bodies."""
 SIDES_HELP = f"{', '.join(SIDES)} (left is -x, front -y, bottom -z)"
@@ -72,16 +80,14 @@ def place(
     say(f"  source: {TISSUES[name].source}")
     for line in lines_of(placing):
         say(line)
-    scene = placed_scene(python_name(stem_of(path)), source, placing, TISSUES[name], how["wall"])
-    body, seconds = None, MESHING
-    try:
-        answer = advise(scene, results=shipped(), timing=False)
-    except StudyError as error:
-        warn([f"the scene has only one body, because none can be recommended: {error}"])
+    organ = Organ("file", organ_options(source, how))
+    scene = placed_scene(python_name(stem_of(path)), organ, placing, TISSUES[name], 6.0, 5, 240)  # as in the file
+    body, seconds, found = None, MESHING, supported(shipped(), scene, name)
+    if found is None:
+        warn(["the scene has only one body, because no random organs are published, by which to recommend one"])
     else:
-        body = second_body(answer)
-        if answer.chosen is not None and answer.chosen.cost.known:
-            seconds += answer.chosen.cost.value * scene.duration
+        body = recommended(scene, *found)
+        seconds += found[1].cost * scene.duration
     seconds += SECONDS_PER_UNKNOWN * ReferencePlan().most  # on one core, roughly, and without compiling
     text = scene_text(placing, organ_options(source, how), name, nodes, body, output.parent)
     write_whole(output, text.encode())
@@ -90,17 +96,34 @@ def place(
     say(f"written to {output}; next: organbench run {output}, which takes about {seconds / 60.0:.0f} minutes")
 
 
-def second_body(answer: Advice) -> Recommended | None:
-    if answer.chosen is None:
-        return None
-    case, force, displacement = answer.chosen.case, answer.chosen.force, answer.chosen.displacement
-    errors = f"force {value_cell(force.value, force.uncertainty, signed=True)} %, "
-    errors += f"displacement {value_cell(displacement.value, displacement.uncertainty)} %"
-    near = "" if answer.meets else ", closest to the default target"
-    alike = answer.alike or (answer.scene.name,)
-    say(f"bodies: tetrahedral of one volume; {case.body.series}, {case.body.nodes} nodes (recommended{near})")
-    say(f"  worst errors of the recommended one in {' and '.join(alike)}: {errors}")
-    return Recommended(body_in_python(case.body), case.dt_fraction, alike, errors)
+def recommended(scene: Scene, case: Case, sample: Unseen) -> Recommended:
+    """The body of a case or, where that does not keep the shape of this organ, the first of larger ones that does, or
+    else the nearest. Says what it found. Raises StudyError if none can be made."""
+    tried, refusals, nodes = list[tuple[ShapeErrors, int]](), list[StudyError](), case.body.nodes
+    for _ in range(TRIES):
+        try:
+            with working(f"the shape of a body of {nodes:,} nodes"), warnings.catch_warnings():
+                warnings.simplefilter("ignore", UserWarning)  # `run` repeats those of the body
+                mesh = mesh_of(scene, replace(case.body, nodes=nodes))
+                facets = mesh.facets if isinstance(mesh, QuadraticMesh) else mesh.triangles
+                tried.append((shape_errors(scene.organ, rest_surfaces(mesh.points, facets), filled=True), nodes))
+            if tried[-1][0].worst <= 1.0:
+                break
+        except StudyError as error:  # a larger mesh may be possible
+            refusals.append(error)
+        nodes = 10 * round(FINER * nodes / 10)
+    if not tried:
+        raise refusals[0]
+    errors, nodes = min(tried, key=lambda pair: pair[0].worst)
+    body, keeps = replace(case.body, nodes=nodes), errors.worst <= 1.0
+    shape = f"with {nodes:,} nodes it is {errors} (allowed: {SHAPE:g} and {SHAPE_VOLUME:g} %)"
+    words = "recommended" if keeps else "the nearest; none keeps the shape"
+    say(f"bodies: {body.series}, {nodes:,} nodes ({words}); tetrahedral of one volume")
+    say(f"  {sample.promise}{'' if nodes == case.body.nodes else f', with {case.body.nodes:,} nodes'}")
+    say(f"  shape of this organ: {shape}")
+    if not keeps:
+        warn([f"part of the shape is missing: {shape}; smooth thin margins (--smooth 3), or do not rely on it there"])
+    return Recommended(body_in_python(body), case.dt_fraction, sample.promise, shape, keeps)
 
 
 def lines_of(placing: Proposal) -> list[str]:

@@ -80,16 +80,27 @@ def own_first(best: Sequence[Best], own: Collection[str]) -> list[Best]:
 
 def answers(best: Sequence[Best], own: Collection[str] = ()) -> dict[str, str]:
     """Three questions and their answers, for the scenes in `own` where a body is judged in one of them; nothing where
-    none is."""
+    none is. First of all what is missing from the shape of a body."""
     best = [row for row in best if row["scene"] in own] or best
     if not best:
         return {}
     papers = [row["paper"] for row in best if row["paper"]]
-    return {
+    lost = "; ".join(words for row in best if (words := _missing(row)))
+    return ({"What is missing?": f"{lost}: use more nodes."} if lost else {}) | {
         "Which body?": _which(best),
         "How wrong?": f"{_capital(_errors(best))}{_meshes(best)}.{_beside(_errors(papers))}",
         "How fast?": f"{_capital(_speed(best) or 'no time is measured')}.{_beside(_speed(papers))}",
     }
+
+
+def _missing(row: Best) -> str:
+    """What the body of a row lacks of the shape of its organ; "" if it keeps the bounds, or if that is not known."""
+    (shape, _), (volume, _) = (row.get(name) or (0.0, 0.0) for name in ("shape", "volume"))
+    if shape <= SHAPE and abs(volume) <= SHAPE_VOLUME:
+        return ""
+    allowed = f"allowed: {SHAPE:g} and {SHAPE_VOLUME:g} %"
+    off = f"up to {plain(float(f'{shape:.2g}'))} % of the size off its organ, volume {volume:+.2g} % ({allowed})"
+    return f"in {readable(row['scene'])} the best body is {off}"
 
 
 def _which(best: Sequence[Best]) -> str:

@@ -6,15 +6,24 @@ from pathlib import Path
 
 import pandas as pd
 
+from massspring import ImplicitVolume
 from studies.base.errors import StudyError
-from studies.metrics.distribution import Distribution, distribution
+from studies.metrics.distribution import BOUND, Distribution, distribution
 from studies.metrics.judged import DISPLACEMENT, FORCE
 from studies.metrics.metric import Metric
+from studies.metrics.wish import Wish, usual_wish
 from studies.runs.case import Case
 from studies.runs.recipe_text import recipe_text
+from studies.runs.recipes import QuadraticBody
+from studies.scene.kind import has_wall
+from studies.scene.scene import Scene
 from studies.store.record import Status
 from studies.tools.advise.campaign import PUBLISHED, published_for
 
+PROBED = {"liver": False, "kidney": False, "stomach": True}
+"""Organs of the population that a probe presses -> whether they are hollow."""
+SIZES, SPEED = (994, 1194, 1594), "real_time [s/s]"
+"""Surface nodes of the adaptive bodies that run in it; column of their simulated over computing time."""
 POPULATION = "population"
 """Folder and table of the study of random organs, which studies/lab/population draws."""
 
@@ -27,6 +36,20 @@ class Unseen:
     force: Distribution
     displacement: Distribution
     where: str
+    cost: float = float("nan")
+    """Median of computing over simulated time [1]."""
+
+    def meets(self, wish: Wish) -> bool:
+        """Whether 95 of 100 members do."""
+        pairs = (self.force.bound, wish.force), (self.displacement.bound, wish.displacement)
+        return all(bound is None or error <= bound for error, bound in pairs)
+
+    @property
+    def promise(self) -> str:
+        """ "95 of 100 random livers: force within 1.7 %, mean displacement within 0.95 %"."""
+        errors = f"force within {self.force.bound:.2g} %, mean displacement within {self.displacement.bound:.2g} %"
+        count = self.displacement.count
+        return f"{int(BOUND * count)} of {count} random {self.organ}s: {errors}"
 
 
 def unseen(results: Path, case: Case) -> Unseen | None:
@@ -34,6 +57,30 @@ def unseen(results: Path, case: Case) -> Unseen | None:
 
     Raises StudyError for a table that cannot be read.
     """
+    return _unseen(results, recipe_text(case), case.scene.organ.shape)
+
+
+def supported(results: Path, scene: Scene, tissue: str) -> tuple[Case, Unseen] | None:
+    """The smallest adaptive body with which 95 of 100 random organs under a probe meet the usual targets, the largest
+    where none does, as a case of `scene`; None where no such member was ever run.
+
+    The organs are those that the tissue is named after, or, where these were not probed or are not as hollow as that of
+    the scene, livers or stomachs. Raises StudyError for a table that cannot be read.
+    """
+    organ = tissue if PROBED.get(tissue) == has_wall(scene) else "stomach" if has_wall(scene) else "liver"
+    best = None
+    for nodes in SIZES:
+        body = QuadraticBody(nodes, graded="adaptive", mass="stiffness")
+        case = Case(scene, body, ImplicitVolume(), dt_fraction=0.8)
+        sample = _unseen(results, recipe_text(case), organ)
+        if sample is not None:
+            best = case, sample
+            if sample.meets(usual_wish(scene)):
+                break
+    return best
+
+
+def _unseen(results: Path, recipe: str, organ: str) -> Unseen | None:
     roots = (results, results / PUBLISHED, published_for(results))
     tables = [root / POPULATION / f"{POPULATION}.csv" for root in roots]
     path = next((table for table in tables if table.is_file()), None)
@@ -41,14 +88,14 @@ def unseen(results: Path, case: Case) -> Unseen | None:
         return None
     try:
         rows = pd.read_csv(path)
-        organ = case.scene.organ.shape
-        rows = rows.loc[(rows["scene"].map(organ_of) == organ) & (rows["recipe"] == recipe_text(case))]
+        rows = rows.loc[(rows["scene"].map(organ_of) == organ) & (rows["recipe"] == recipe)]
         force, displacement = (_of(rows, entry) for entry in (FORCE, DISPLACEMENT))
+        cost = 1.0 / rows[SPEED].median() if SPEED in rows else float("nan")
     except (KeyError, ValueError, OSError) as error:
         raise StudyError(
             f"{path} cannot be read ({error}); remove it, or run studies/lab/population/study.py again"
         ) from error
-    return Unseen(organ, force, displacement, str(path)) if displacement.count else None
+    return Unseen(organ, force, displacement, str(path), cost) if displacement.count else None
 
 
 def organ_of(name: str) -> str | None:

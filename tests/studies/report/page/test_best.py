@@ -36,6 +36,12 @@ def test_a_body_beyond_the_bounds_of_the_shape_is_not_the_best():
     assert not best["meets"] and best["case"] == "tetrahedral-300-implicit_volume"
 
 
+def test_what_is_missing_from_the_shape_stands_first():
+    first, answer = next(iter(answers(best_bodies([good(distance=0.0197)], named)).items()))
+    assert first == "What is missing?" and "up to 2 % of the size off its organ" in answer
+    assert next(iter(answers(best_bodies([good()], named)))) == "Which body?"
+
+
 def test_the_cheapest_body_within_the_target_stands_beside_the_papers_with_its_numbers():
     runs = [paper(frame_ms=5.0), good(frame_ms=40.0, nodes=400), good(), good(method=Free(), nodes=9)]
     (best,) = best_bodies(runs, named)
