@@ -1,6 +1,7 @@
 """Symmetric indefinite sparse systems: MKL Pardiso if installed, otherwise SciPy's SuperLU."""
 
 import os
+import shlex
 import sys
 import warnings
 from collections.abc import Callable
@@ -59,7 +60,7 @@ def load_pardiso():
     except ImportError as problem:
         warnings.warn(
             f"pypardiso is not usable ({problem}): SciPy's solver gives the same answers, five to twenty times "
-            f"slower; install the package pypardiso for speed",
+            f"slower; for speed run {shlex.join([sys.executable, '-m', 'pip', 'install', 'pypardiso'])}",
             SlowSolverWarning,
             stacklevel=3,
         )

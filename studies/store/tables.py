@@ -7,6 +7,7 @@ import pandas as pd
 
 from studies.base.atomic import write_whole
 from studies.base.errors import StudyError
+from studies.base.install import pip_install
 
 
 def write_table(path: Path, table: pd.DataFrame) -> Path:
@@ -22,7 +23,8 @@ def write_parquet(path: Path, table: pd.DataFrame) -> Path:
         table.to_parquet(image, engine="pyarrow", index=False)
     except ImportError as error:
         raise StudyError(
-            f"{path} needs the package pyarrow, which is not installed: pip install 'pyarrow>=18', or write --csv"
+            f"{path} needs the package pyarrow, which is not installed: {pip_install('organbench[parquet]')}, or "
+            "write --csv"
         ) from error
     write_whole(path, image.getvalue())
     return path

@@ -10,6 +10,7 @@ import numpy as np
 from scipy.ndimage import find_objects, gaussian_filter
 
 from studies.base.errors import StudyError
+from studies.base.install import pip_install
 from studies.base.within import file_within
 from studies.geometry.files.content import Content
 from studies.geometry.mesh.organ_mesh import signed_volume
@@ -180,7 +181,7 @@ def segments(header: Mapping[str, Any]) -> dict[Label, str]:
 def missing(name: str, path: Path) -> StudyError:
     return StudyError(
         f"{path.name} is a label mask, and {name}, which reads it, is not installed; "
-        "run pip install 'organbench[masks]'"
+        f"run {pip_install('organbench[masks]')}"
     )
 
 

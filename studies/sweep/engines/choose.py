@@ -6,13 +6,14 @@ from functools import partial
 from pathlib import Path
 
 from studies.base.errors import StudyError
+from studies.base.install import pip_install
 from studies.sweep.executor import Executor
 from studies.sweep.local import Local
 
 LOCAL = "local"
 EXTRA = ("distributed", "dask", "dask_jobqueue", "yaml", "psutil")
 """What the extra `cluster` installs."""
-NEEDED = "needs the extra `cluster`, which is not installed: pip install 'organbench[cluster]'"
+NEEDED = f"needs the extra `cluster`, which is not installed: {pip_install('organbench[cluster]')}"
 NO_WORKER_SECONDS = 60.0
 """Time that a running cluster may be without a worker."""
 WORDS = "local:N, an address as tcp://HOST:8786, or a FILE.yaml"

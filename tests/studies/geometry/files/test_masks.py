@@ -262,5 +262,7 @@ def test_without_the_reader_the_sentence_says_how_to_install_it(mask, monkeypatc
         return load(name, *rest, **options)
 
     monkeypatch.setattr(builtins, "__import__", without)
-    with pytest.raises(StudyError, match=r"nibabel, which reads it, is not installed; run pip install .organbench"):
+    with pytest.raises(
+        StudyError, match=r"nibabel, which reads it, is not installed; run .*-m pip install .organbench"
+    ):
         opened(Source(mask))

@@ -230,5 +230,5 @@ def test_a_missing_package_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "distributed", None)
     for name in ("cluster", "queue", "worker"):
         monkeypatch.delitem(sys.modules, f"studies.sweep.engines.{name}", raising=False)
-    with pytest.raises(StudyError, match=r"needs the extra `cluster`, which is not installed: pip install"):
+    with pytest.raises(StudyError, match=r"needs the extra `cluster`, which is not installed: .*-m pip install"):
         chosen("tcp://127.0.0.1:8786")

@@ -46,6 +46,16 @@ def test_an_extra_that_is_missing_is_no_fault():
     assert (finding.level, finding.mend) == (Level.NOTE, f"{sys.executable} -m pip install 'not-there>=2'")
 
 
+def test_a_package_of_another_distribution_by_a_name_of_ours_is_found(monkeypatch):
+    monkeypatch.setattr(software, "packages_distributions", lambda: {"studies": ["organbench"]})
+    assert [finding.level for finding in software.foreign()] == [Level.OK]
+    owners = {"massspring": ["organbench", "massspring"], "studies": ["other", "organbench"]}
+    monkeypatch.setattr(software, "packages_distributions", lambda: owners)
+    first, second = software.foreign()
+    assert first.level is Level.FAULT and "massspring is also a package of massspring" in first.sentence
+    assert f"{sys.executable} -m pip uninstall other" in second.mend
+
+
 def test_a_distribution_that_is_not_installed_is_a_fault(monkeypatch):
     def absent(name):
         raise PackageNotFoundError(name)
