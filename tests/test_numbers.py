@@ -15,6 +15,7 @@ import pandas as pd
 import pytest
 
 from massspring import METHODS
+from reference_fem.uncertainty import NESTED_SAFETY, SAFETY
 from studies.catalog.accuracy import ACCURACY
 from studies.geometry.organs import make_shape
 from studies.geometry.surface.first_surface import true_volume
@@ -151,8 +152,10 @@ def members() -> pd.DataFrame:
     high, low, far = ((sizes + sign * bars > targets) for sign in (1, -1, 0))
     lost = (table["status"] != "ok") | table[MEAN].isna() | (table[DISTANCE] > SHAPE)
     wide, beyond = bars > targets / 3, low.any(axis=1)
+    now = bars * NESTED_SAFETY / SAFETY  # the table is older than the calibration
+    open_now = (sizes + now > targets).any(axis=1) & ~(sizes - now > targets).any(axis=1)
     return table.assign(
-        missed=lost | far.any(axis=1), open=high.any(axis=1) & ~beyond, beyond=beyond,
+        missed=lost | far.any(axis=1), open=high.any(axis=1) & ~beyond, beyond=beyond, open_now=open_now,
         far_force=far[:, 0], far_mean=far[:, 1], wide_force=wide[:, 0], wide_mean=wide[:, 1],
     )  # fmt: skip
 
@@ -332,6 +335,7 @@ ROWS = [
     (PEOPLE, "is known within # % in force and # % in displacement, from its meshes alone. With it # livers and # "
         "spleens", lambda: (*(of(members(), nodes=1594)[floor(column)].max() for column in (FORCE, MEAN)),
                             *count("open", 1594, "liver", "spleen"))),
+    (PEOPLE, "with the present ones # livers and # spleens", lambda: count("open_now", 1594, "liver", "spleen")),
     (PEOPLE, "**With 1,194 nodes** # livers and # spleens miss a target or fail, with 994 nodes # and #.", lambda: (
         *count("missed", 1194, "liver", "spleen"), *count("missed", 994, "liver", "spleen"))),
     (PEOPLE, "takes # s for one liver or stomach, # s for a spleen, # s for a bladder and # s for a kidney", lambda: [
@@ -450,7 +454,7 @@ def test_times_of_cuts_with_virtual_nodes():
 
 def test_methods_of_the_page_are_those_of_the_tuple():
     text = (ROOT / "docs/methods.md").read_text(encoding="utf-8").split("## Claims")[1].split("## ")[0]
-    assert {method.name for method in METHODS} <= set(re.findall(r"^\| (\w+) \|", text, re.M))
+    assert {method.name for method in METHODS} <= set(re.findall(r"^\| (\w+) (?:§ )?\|", text, re.M))
 
 
 def test_scenes_of_the_first_table_share_the_tissue_and_the_step():

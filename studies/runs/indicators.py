@@ -1,5 +1,5 @@
 """Indicators that a result is not reliable although the run ended well: a body that may lock, pressures that alternate
-between neighbours, a force that varies while all loads are at rest."""
+between neighbours, a force that varies while all loads are at rest, a volume that is not kept."""
 
 import numpy as np
 from scipy.sparse import csr_array
@@ -16,17 +16,22 @@ SWAYS = 0.01
 """Bound of the variation of the force, over the force."""
 STILL_FRAMES = 20
 """Frames at the end of a run over which the variation of the force is measured."""
+VOLUME_OFF = 1e-4
+"""Bound of the error of all kept volumes together, which methods that keep volumes promise for a body that does not
+turn. One that turns at omega [1/s] is (omega dt)² too large, because a step moves nodes along tangents."""
 LOCKS = 2.0
 """Bound of the number of unknowns per kept volume. The continuum has three; one volume per tetrahedron gives 0.6."""
 
 
-def indicators(scene: Scene, body: Body, history: History, lumen: int) -> dict[str, float]:
-    """Attributes of a run (RUN_ATTRIBUTES); NaN if they do not apply. lumen: column of the lumen, or −1."""
+def indicators(scene: Scene, body: Body, history: History, lumen: int, keeps: bool) -> dict[str, float]:
+    """Attributes of a run (RUN_ATTRIBUTES); NaN if they do not apply. lumen: column of the lumen, or −1; keeps: whether
+    the method claims to keep volumes."""
     pressure = history.pressure[history.good_frames - 1] if history.good_frames else history.pressure[:0]
     alternation = unlike_neighbours(pressure, neighbours(body.kept, lumen)) if len(pressure) else np.nan
     return {
         "unknowns_per_volume": 3.0 * body.node_count / body.kept.count,
         "alternation": float(alternation / scene.tissue.shear_modulus),
+        "volume_off": volume_off(history) if keeps else np.nan,
         "sway": sway(scene, history.t[: history.good_frames], history.contact_force, history.held_force),
     }
 
@@ -45,7 +50,18 @@ def remarks(signs: dict[str, float]) -> list[str]:
     if signs["sway"] > SWAYS:
         percent = 100 * signs["sway"]
         lines.append(f"the force oscillates by {percent:.2g} % at the end while nothing outside moves; halve the step")
+    if signs["volume_off"] > VOLUME_OFF:
+        lines.append(
+            f"the kept volume is up to {100 * signs['volume_off']:.2g} % off (bound {100 * VOLUME_OFF:g} %); a body "
+            "that turns at omega is (omega dt)² too large: halve the step for a quarter of it"
+        )
     return lines
+
+
+def volume_off(history: History) -> float:
+    """Largest |V/V0 − 1| [1] of all kept volumes together after any good frame; NaN without one."""
+    volume, target = (values[: history.good_frames].sum(axis=1) for values in (history.volume, history.volume_target))
+    return float(np.abs(volume / target - 1.0).max(initial=0.0)) if len(volume) else float("nan")
 
 
 def neighbours(kept: Volumes | PointVolumes, lumen: int) -> np.ndarray:

@@ -134,6 +134,7 @@ class RunAttributes(Timed):
     cut_seconds = optional_value(float, "s", "longest wall time of replacing it")
     unknowns_per_volume = optional_value(float, "1", "coordinates for each kept volume")
     alternation = optional_value(float, "1", "rms of pressure less the mean of its neighbours', over mu")
+    volume_off = optional_value(float, "1", "largest error of all kept volumes together after any frame")
     sway = optional_value(float, "1", "range of the force at rest about its trend, over its mean")
     warnings = value(str, "", "what preparing the case warned of, and what its indicators report")
     entry = optional_value(str, "", "of an entry from outside: its file, with the SHA-256 of its positions")

@@ -7,14 +7,26 @@ from typing import cast
 import numpy as np
 import pytest
 
-from massspring import History, Sphere, Trajectory, Volumes, quadratic_body, tetrahedral_body
+from massspring import (
+    Clock,
+    History,
+    ImplicitVolume,
+    Setup,
+    Shake,
+    Sphere,
+    Trajectory,
+    Volumes,
+    quadratic_body,
+    simulate,
+    tetrahedral_body,
+)
 from studies.runs.indicators import SWAYS, indicators, neighbours, remarks, still_from, sway, unlike_neighbours
 from studies.runs.run import measure
 from tests.massspring.conftest import SOFT, block
 from tests.massspring.quadratic import quadratic_block
 from tests.studies.tiny import SQUEEZE, tiny_case
 
-GOOD = {"unknowns_per_volume": 3.0, "alternation": 0.1, "sway": 1e-3}
+GOOD = {"unknowns_per_volume": 3.0, "alternation": 0.1, "sway": 1e-3, "volume_off": 9e-5}
 
 
 def history(force, good_frames=50, pressure=None) -> History:
@@ -28,6 +40,8 @@ def history(force, good_frames=50, pressure=None) -> History:
         held_force=np.zeros((50, 0, 3)),
         good_frames=good_frames,
         pressure=np.zeros((50, 1)) if pressure is None else pressure,
+        volume=np.ones((50, 1)),
+        volume_target=np.ones((50, 1)),
     )
     return cast(History, made)
 
@@ -78,7 +92,12 @@ def test_a_checkerboard_counts_and_a_gradient_does_not():
 
 @pytest.mark.parametrize(
     ("changed", "word"),
-    [({"unknowns_per_volume": 0.6}, "locks"), ({"alternation": 0.6}, "alternate"), ({"sway": 2 * SWAYS}, "oscillates")],
+    [
+        ({"unknowns_per_volume": 0.6}, "locks"),
+        ({"alternation": 0.6}, "alternate"),
+        ({"sway": 2 * SWAYS}, "oscillates"),
+        ({"volume_off": 2.5e-3}, "0.25 % off (bound 0.01 %)"),
+    ],
 )
 def test_each_indicator_has_a_remark_beyond_its_bound(changed, word):
     assert remarks(GOOD) == [] and remarks(dict.fromkeys(GOOD, np.nan)) == []
@@ -91,7 +110,21 @@ def test_pressures_are_those_of_the_last_good_frame():
     pressure = np.full((50, body.kept.count), np.nan)
     pressure[1] = 7.0
     ended = history(np.ones_like, good_frames=2, pressure=pressure)
-    assert indicators(SQUEEZE, body, ended, -1)["alternation"] == 0.0
+    assert indicators(SQUEEZE, body, ended, -1, True)["alternation"] == 0.0
+
+
+@pytest.mark.parametrize("omega", [1.0, 20.0])
+def test_a_body_that_turns_is_too_large_by_the_square_of_its_angle_in_a_step(omega):
+    """A node at radius r moves dt omega r along the tangent, to r √(1 + (omega dt)²), in two directions: the volume
+    grows by (omega dt)². shake, which ends each step at V0, has no such error."""
+    body, dt = tetrahedral_body(*block((3, 3, 2)), SOFT), 2.5e-3
+    spin = np.cross([0.0, 0.0, omega], body.rest - body.mass @ body.rest / body.mass.sum())
+    for method, expected in ((ImplicitVolume(), (omega * dt) ** 2), (Shake(), 0.0)):
+        made = simulate(Setup(body, method, Clock(4 * dt, 20, 4), velocity=spin))
+        off = indicators(SQUEEZE, body, made, -1, True)["volume_off"]
+        assert off == pytest.approx(expected, rel=0.1, abs=1e-12)
+        assert bool(remarks(GOOD | {"volume_off": off})) == (expected > 1e-4)
+    assert np.isnan(indicators(SQUEEZE, body, made, -1, False)["volume_off"])
 
 
 def test_a_record_has_them(mesh_cache):
