@@ -15,8 +15,9 @@ from studies.metrics.wish import Wish, usual_wish
 from studies.runs.case import Case
 from studies.runs.recipe_text import recipe_text
 from studies.runs.recipes import QuadraticBody
-from studies.scene.kind import has_wall
+from studies.scene.kind import has_wall, load_of
 from studies.scene.scene import Scene
+from studies.scene.tissues import TISSUES
 from studies.store.record import Status
 from studies.tools.advise.campaign import PUBLISHED, published_for
 
@@ -53,22 +54,31 @@ class Unseen:
 
 
 def unseen(results: Path, case: Case) -> Unseen | None:
-    """Of the recipe of a case on organs of the kind of its scene; None where no such member was ever run.
+    """Of the recipe of a case on organs of the kind of its scene, for a probed organ from a file those of its tissue;
+    None where no such member was ever run.
 
     Raises StudyError for a table that cannot be read.
     """
-    return _unseen(results, recipe_text(case), case.scene.organ.shape)
+    scene, organ = case.scene, case.scene.organ.shape
+    if organ == "file" and load_of(scene) == "probe":
+        organ = drawn_for(scene, next((name for name, tissue in TISSUES.items() if tissue == scene.tissue), ""))
+    return _unseen(results, recipe_text(case), organ)
+
+
+def drawn_for(scene: Scene, tissue: str) -> str:
+    """The probed organs of the population that stand for those of a tissue: those it is named after or, where these
+    were not probed or are not as hollow as that of the scene, livers or stomachs."""
+    hollow = has_wall(scene)
+    return tissue if PROBED.get(tissue) == hollow else "stomach" if hollow else "liver"
 
 
 def supported(results: Path, scene: Scene, tissue: str) -> tuple[Case, Unseen] | None:
     """The smallest adaptive body with which 95 of 100 random organs under a probe meet the usual targets, the largest
     where none does, as a case of `scene`; None where no such member was ever run.
 
-    The organs are those that the tissue is named after, or, where these were not probed or are not as hollow as that of
-    the scene, livers or stomachs. Raises StudyError for a table that cannot be read.
+    The organs are those of `drawn_for`. Raises StudyError for a table that cannot be read.
     """
-    organ = tissue if PROBED.get(tissue) == has_wall(scene) else "stomach" if has_wall(scene) else "liver"
-    best = None
+    organ, best = drawn_for(scene, tissue), None
     for nodes in SIZES:
         body = QuadraticBody(nodes, graded="adaptive", mass="stiffness")
         case = Case(scene, body, ImplicitVolume(), dt_fraction=0.8)

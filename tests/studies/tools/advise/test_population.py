@@ -14,6 +14,7 @@ from studies.runs.case import Case
 from studies.runs.recipe_text import recipe_text
 from studies.runs.recipes import QuadraticBody
 from studies.scene.library import KIDNEY_PROBE, LIVER_PROBE, STOMACH_PROBE
+from studies.scene.scene import Organ
 from studies.tools.advise.campaign import shipped
 from studies.tools.advise.population import organ_of, supported, unseen, words
 
@@ -49,6 +50,8 @@ def test_without_runs_on_the_population_there_is_no_summary(no_tables, tmp_path)
     table(tmp_path / "population" / "population.csv")
     assert unseen(tmp_path, replace(CASE, dt_fraction=0.1)) is None
     assert unseen(tmp_path, replace(CASE, scene=KIDNEY_PROBE)).force.count == 1
+    scan = replace(KIDNEY_PROBE, organ=Organ("file", {"path": "scan.stl", "unit": "mm", "remesh": True}))
+    assert unseen(tmp_path, replace(CASE, scene=scan)).organ == "kidney"
 
 
 def test_the_smallest_body_that_keeps_the_targets_on_95_of_100_organs_is_supported(tmp_path):
