@@ -1,16 +1,20 @@
 """How every job of a study stands, by the ledger of what is stored."""
 
+import re
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from studies.base.counting import amounts, status_counts
 from studies.catalog.study import Study
+from studies.runs.recipe_text import body_words
+from studies.runs.recipes import ADAPTIVE
 from studies.store.entry import MISSING, Entry
 from studies.store.ledger import FAILURES, Ledger
 from studies.store.schema import Status
-from studies.sweep.job import Job, case_jobs, jobs_of, reference_jobs
+from studies.sweep.job import CaseJob, Job, case_jobs, jobs_of, reference_jobs
 
+PERCENTAGE = re.compile(r"(\d+(?:\.\d+)?) %")
 CAUSES = 8
 """Of failures that are named one by one."""
 
@@ -51,10 +55,22 @@ def failed(ledger: Ledger, job: Job) -> bool:
 
 
 def warnings_of(ledger: Ledger, study: Study) -> list[str]:
-    """What the references and cases of a study warned of, a sentence each."""
+    """What the references and cases of a study warned of, a line each that begins with the body: references first, then
+    bodies by how much is expected of them, adaptive before other quadratic ones; of equals the worst first, by the
+    largest percentage."""
     jobs = (*reference_jobs(ledger.root, study.scenes), *case_jobs(ledger.root, study))
-    entries = map(ledger.entry, jobs)
-    return [entry.warnings for entry in entries if entry is not None and entry.warnings]
+    stored = [(job, entry.warnings) for job in jobs if (entry := ledger.entry(job)) is not None and entry.warnings]
+    stored.sort(key=lambda pair: (*_expected_less(pair[0]), -max(map(float, PERCENTAGE.findall(pair[1])), default=0.0)))
+    return list(dict.fromkeys(f"{_body_of(job)}: {text}" for job, text in stored))
+
+
+def _expected_less(job: Job) -> tuple[bool, ...]:
+    body = job.work.body if isinstance(job, CaseJob) else None
+    return (body is not None, body is not None and body.graded != ADAPTIVE, getattr(body, "kind", "") != "quadratic")
+
+
+def _body_of(job: Job) -> str:
+    return body_words(job.work.body) if isinstance(job, CaseJob) else job.kind
 
 
 def summary(job_standings: Sequence[Standing]) -> str:

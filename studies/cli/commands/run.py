@@ -41,6 +41,8 @@ from studies.sweep.standings import causes, failed, standings, summary, unexpect
 
 JOBS = 2
 """Processes by default."""
+WARNED = 3
+"""Warnings that are printed; `organbench show` has all."""
 AGAIN = "timing: re-measure stored cases on this machine; run nothing else"
 MAIN_STUDIES = ", ".join(study.name for study in STUDIES if study.main)
 GIVEN = f"studies, or a FILE.py with STUDY or SCENE ({PROGRAM}); default: {MAIN_STUDIES}"
@@ -167,9 +169,8 @@ class Work:
             sweep_parts(folder)
         warn(link_study(ledger, study.name))
         warnings = warnings_of(ledger, study) if count else []
-        if len(warnings) > 1:
-            warnings[0] += f" (and {len(warnings) - 1} more cases warn; `organbench show` prints them)"
-        warn(warnings[:1])
+        more = len(warnings) - WARNED
+        warn([*warnings[:WARNED], *([f"and {more} more; `organbench show` prints them"] if more > 0 else [])])
         if self.drawn:
             warn(refresh(ledger, study)[1])
         what = "charts" if self.drawn else "records"

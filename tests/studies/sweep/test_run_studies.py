@@ -11,7 +11,9 @@ from studies.metrics.table import frame_of, metric, study_table
 from studies.metrics.timing import cases as timed
 from studies.metrics.timing.cases import timing_file
 from studies.runs.current import case_path
+from studies.runs.recipes import ADAPTIVE, QuadraticBody, TetrahedralBody
 from studies.scene.scene import ReferencePlan
+from studies.store.entry import Entry
 from studies.store.ledger import Ledger
 from studies.store.record import Status, read_record, write_record
 from studies.sweep.job import CaseJob, jobs_of
@@ -69,11 +71,33 @@ def test_a_damaged_file_is_stale_and_runs_again(results, number):
     assert len(runs) == 2
     assert len(remarks) == 1
     assert path.name in remarks[0] and ("has no checksum" if number else "is cut off or damaged") in remarks[0]
-    # The two other cases have a warning on the shape of their bodies; the damaged one has none.
-    assert ["volume -9.7 %" in sentence for sentence in warnings_of(Ledger(results), study)] == [True, True]
+    # The two other cases have the same body, which warns of its shape; the damaged one has none.
+    (warning,) = warnings_of(Ledger(results), study)
+    assert warning.startswith("tetrahedral, 60: ") and "volume -9.7 %" in warning
     assert not failed(Ledger(results), CaseJob(results, "tiny", diverging_case()))
     assert run_studies(results, [study], 1, Silent()) == 1
     assert load_runs(results, study)[1] == []
+
+
+def test_warnings_of_the_best_body_come_first_and_the_worst_of_equals(tmp_path):
+    texts = {
+        TetrahedralBody(300): "volume -2.5 %",
+        TetrahedralBody(60): "volume -9.7 %, up to 0.5 %",
+        QuadraticBody(594, graded=ADAPTIVE): "11.4 mm of the scan is missing",
+        QuadraticBody(594): "volume -0.2 %",
+    }
+
+    class Told(Ledger):
+        def entry(self, job):
+            return Entry("a.h5", (), warnings=texts[job.work.body])
+
+    study = tiny_study(cases=tuple(tiny_case(body=body) for body in texts))
+    assert [line.split(": ")[0] for line in warnings_of(Told(tmp_path), study)] == [
+        "adaptive quadratic, 594",
+        "quadratic, 594",
+        "tetrahedral, 60",
+        "tetrahedral, 300",
+    ]
 
 
 def test_only_what_the_filter_lets_through(results):
