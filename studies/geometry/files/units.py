@@ -22,6 +22,7 @@ FAR_AWAY = 1e3
 """Distance from the origin [m] beyond which coordinates have too few digits left for an organ."""
 ABSURD = 1e6, 1e-9
 """Longest side [m] above and below which a file is not even examined."""
+DETACHED = re.compile(rb"^data ?file:=?[ \t]*(\S.*?)\s*$", re.MULTILINE)
 NAMES = {"m": "metres", "cm": "centimetres", "mm": "millimetres", "um": "micrometres", "in": "inches"}
 
 
@@ -69,10 +70,15 @@ class Source:
 
     @property
     def sha256(self) -> str | None:
-        """SHA-256 of the bytes of the file (hexadecimal), which identifies it at any path; None if it cannot be
-        read."""
+        """SHA-256 of the bytes of the file (hexadecimal) and of the data file next to an NRRD header, which identifies
+        it at any path; None if it cannot be read."""
         try:
-            return hashlib.sha256(self.path.read_bytes()).hexdigest()
+            content = self.path.read_bytes()
+            detached = DETACHED.search(content) if self.path.suffix.lower() == ".nhdr" else None
+            data = None if detached is None else Path(self.path.parent, detached[1].decode(errors="replace"))
+            if data is not None and data.is_file() and data.parent == self.path.parent:
+                content += data.read_bytes()
+            return hashlib.sha256(content).hexdigest()
         except OSError:
             return None
 

@@ -144,6 +144,11 @@ def test_the_data_of_a_header_lie_in_its_folder(tmp_path):
     file = next(name for name in folder.iterdir() if name.suffix != ".nhdr")
     header = (folder / "a.nhdr").read_text()
     assert opened(Source(folder / "a.nhdr", part="1")).unit == "mm"
+    whole = Source(folder / "a.nhdr").sha256
+    file.rename(folder / "kept")
+    assert Source(folder / "a.nhdr").sha256 != whole  # results belong to the voxels too
+    (folder / "kept").rename(file)
+    assert Source(folder / "a.nhdr").sha256 == whole
     (tmp_path / file.name).write_bytes(file.read_bytes())
     (folder / "link").symlink_to(tmp_path / file.name)
     os.mkfifo(folder / "pipe")
