@@ -5,7 +5,6 @@ import lzma
 import re
 import zlib
 from pathlib import Path
-from xml.etree import ElementTree
 from xml.etree.ElementTree import ParseError
 
 import h5py
@@ -80,10 +79,6 @@ def check_promises(path: Path) -> None:
             raise unreadable(path, f"it is {kind}")
     if h5py.is_hdf5(path):  # its signature may stand behind a block of another program
         raise unreadable(path, "it is an HDF5 file")
-    if suffix in (".xdmf", ".xmf") and any(
-        item.get("Format", "XML") != "XML" for item in ElementTree.parse(path).iter()
-    ):
-        raise unreadable(path, "its numbers are in another file: write a VTU")
     if suffix == ".stl" and not is_ascii_stl(head):
         check_stl(path, head, size)
     if head.startswith(PACKED) and not path.name.lower().endswith((".nii.gz", ".nrrd.gz")):

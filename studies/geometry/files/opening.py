@@ -27,7 +27,7 @@ from studies.geometry.files.vtk_files import is_legacy_polydata, read_legacy, re
 
 def read_by_meshio(path: Path) -> meshio.Mesh:
     """The mesh of a file. Raises any exception of meshio for a broken one, and ReadError for one of ANSYS Fluent that
-    gives its cells by their faces alone."""
+    is not read whole."""
     kind = {".msh": "gmsh", ".fem": "nastran", ".bdf": "nastran", ".nas": "nastran"}.get(path.suffix)
     if path.suffix == ".msh" and path.read_bytes().lstrip().startswith(b"("):
         try:
@@ -36,7 +36,7 @@ def read_by_meshio(path: Path) -> meshio.Mesh:
                 return mesh
         except (Exception, SystemExit):
             pass  # said below
-        raise meshio.ReadError("a mesh of ANSYS Fluent whose cells are given by their faces: save it as VTU")
+        raise meshio.ReadError("a mesh of ANSYS Fluent that meshio cannot read whole: save it as VTU")
     return meshio.read(path, file_format=kind)
 
 

@@ -2,9 +2,7 @@
 
 import json
 import re
-from urllib.parse import unquote
 
-import meshio
 import numpy as np
 
 MARK = b"\xef\xbb\xbf"
@@ -80,14 +78,11 @@ def fluent_cells(data: bytes) -> int:
 
 
 def gltf_triangles(data: bytes) -> int:
-    """The triangles of all nodes of a glTF file. Raises ReadError if it refers to a file outside its folder."""
+    """The triangles of all nodes of a glTF file."""
     text = data
     if data.startswith(b"glTF"):
         text = data[20 : 20 + int.from_bytes(data[12:16], "little")]
     tree, total = json.loads(text), 0
-    for uri in (unquote(entry.get("uri", "")) for entry in tree.get("buffers", [])):
-        if not uri.startswith("data:") and re.search(r"[/\\:]|^\.\.", uri):
-            raise meshio.ReadError("its numbers lie in a file outside its folder: export it as GLB")
     for node in tree.get("nodes", []):
         for part in tree["meshes"][node["mesh"]]["primitives"] if "mesh" in node else []:
             corners = tree["accessors"][part.get("indices", part["attributes"]["POSITION"])]["count"]
