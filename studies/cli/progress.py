@@ -3,7 +3,7 @@
 import time
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager, nullcontext
+from contextlib import ExitStack, contextmanager
 from types import TracebackType
 
 from rich.console import Console
@@ -11,11 +11,9 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextC
 
 from studies.base.counting import amounts
 from studies.base.interrupts import stop_if_pressed
+from studies.cli.terminal import QUIET_SECONDS, beating, busy
 from studies.store.entry import MISSING
 from studies.sweep.plan import Planned, expected, kind_of
-
-QUIET_SECONDS = 10.0
-"""Without a terminal (a log file), a line at most this often."""
 
 
 def words(seconds: float) -> str:
@@ -43,17 +41,30 @@ class TerminalProgress:
         self.done: Counter[str] = Counter()
         """Number of finished pieces, by kind."""
         self.compiled: set[str] = set()
-        self.last_report = time.monotonic()
+        self.begun = self.last_report = time.monotonic()
         self.last_compile_report = 0.0
+        self.beats = ExitStack()
 
     def __enter__(self) -> "TerminalProgress":
         if self.console.is_terminal:
             self.bars.start()
+        else:
+            self.beats.enter_context(beating(self._beat))
         return self
 
     def __exit__(self, kind: type | None, value: BaseException | None, trace: TracebackType | None) -> None:
+        self.beats.close()
         if self.console.is_terminal:  # elsewhere stopping would print an empty line
             self.bars.stop()
+
+    def _beat(self) -> None:
+        """Where nothing has been said for a while: what is going on."""
+        now = time.monotonic()
+        if self.totals and now - self.last_report >= QUIET_SECONDS:
+            self.last_report = now
+            what, (done, total) = list(self.totals.items())[-1]
+            left = self.left()
+            self._line(f"{what} {done}/{total} done, {words(now - self.begun)}" + (f", {left}" if left else ""))
 
     def begin(self, what: str, total: int) -> None:
         self.totals[what] = [0, total]
@@ -98,9 +109,10 @@ class TerminalProgress:
 
 
 @contextmanager
-def compiling(console: Console, doing: str) -> Iterator[Callable[[str], None]]:
-    """Inside, what is given names is shown as being compiled, next to what is being done; in a log nothing is."""
-    with console.status(f"{doing} …") if console.is_terminal else nullcontext() as status:
+def compiling(doing: str) -> Iterator[Callable[[str], None]]:
+    """Inside, what is given names is shown as being compiled, next to what is being done; in a log a line every
+    QUIET_SECONDS."""
+    with busy(doing) as status:
         yield lambda name: status and status.update(f"{doing}: compiling {name} (kept for the next time) …")
 
 

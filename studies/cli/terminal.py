@@ -1,9 +1,11 @@
 """Shared by all commands: where they print, and the options for results and studies."""
 
+import time
 import unicodedata
-from collections.abc import Iterable
-from contextlib import nullcontext
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from threading import Event, Thread
 from typing import Annotated, Any
 
 import typer
@@ -17,6 +19,8 @@ from studies.scene.library import CUT, SCENES
 STEERING = {"Cc", "Cf", "Cs"}
 """Categories of Unicode whose characters steer a terminal, or the direction of a text, and have no shape."""
 KEPT = "\n\t"
+QUIET_SECONDS = 10.0
+"""Without a terminal (a log file), a line so often while something takes long."""
 
 
 def visible(text: str) -> str:
@@ -97,5 +101,26 @@ def warn(sentences: list[str]) -> None:
 
 
 def busy(what: str) -> Any:
-    """A line that moves while something takes long; nothing where there is no terminal."""
-    return errors.status(f"{what} …") if errors.is_terminal else nullcontext()
+    """A line that moves while something takes long; where there is no terminal, a line every QUIET_SECONDS."""
+    if errors.is_terminal:
+        return errors.status(f"{what} …")
+    begun = time.monotonic()
+    return beating(lambda: errors.print(f"{what}, {time.monotonic() - begun:.0f} s", markup=False, highlight=False))
+
+
+@contextmanager
+def beating(beat: Callable[[], None]) -> Iterator[None]:
+    """Inside, calls `beat` every QUIET_SECONDS, from a thread."""
+    ended = Event()
+
+    def run() -> None:
+        while not ended.wait(QUIET_SECONDS):
+            beat()
+
+    thread = Thread(target=run, daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        ended.set()
+        thread.join()

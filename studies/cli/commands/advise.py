@@ -9,7 +9,7 @@ from studies.base.compile_watch import watching
 from studies.cli.options import budget as in_time
 from studies.cli.options import share
 from studies.cli.progress import compiling
-from studies.cli.terminal import Results, SceneName, errors, say
+from studies.cli.terminal import Results, SceneName, say
 from studies.sweep.find_scene import find_scene
 from studies.tools.advise.answer import advise as answered
 from studies.tools.advise.words import lines_of
@@ -30,7 +30,7 @@ def advise(
     Without --force and --displacement: force within 3 %, displacement within 1 %; hollow organs 6 % and 3 %.
     """
     bounds = share(force, "force"), share(displacement, "displacement"), in_time(budget)
-    with compiling(errors, "timing") as report, watching(report):
+    with compiling("timing") as report, watching(report):
         advice = answered(find_scene(scene), *bounds, results=results, timing=timing)
     for line in lines_of(advice):
         say(line)

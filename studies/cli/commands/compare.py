@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 from rich.table import Table
 
-from studies.cli.terminal import console, say
+from studies.cli.terminal import busy, console, say
 from studies.metrics.cells import MISSING, plain
 from studies.metrics.change import Change, Verdict, labels_of
 from studies.metrics.compare_folders import Comparison
@@ -31,7 +31,8 @@ def compare(
     number moved: an error by more than its uncertainty, a time by more than its spread, any other by more than
     round-off.
     """
-    comparison = compared(old, new)
+    with busy(f"comparing {old} and {new}"):
+        comparison = compared(old, new)
     for line in [*summary(comparison), *comparison.findings]:
         say(line)
     rows = rows_of(comparison.moved[:SHOWN], comparison)

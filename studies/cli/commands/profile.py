@@ -11,7 +11,7 @@ from rich.table import Table
 from studies.base.compile_watch import watching
 from studies.cli.options import BodyKind, MethodName, SurfaceNodes, chosen_case
 from studies.cli.progress import compiling
-from studies.cli.terminal import SceneName, console, errors
+from studies.cli.terminal import SceneName, console
 from studies.metrics.cells import value_cell
 from studies.metrics.timing.stage_cost import BUDGET, FRAME, SKIPPED, STAGE, cost_table
 from studies.runs.case import Case
@@ -33,7 +33,7 @@ def profile(
 ) -> None:
     """Measure the stages of a time step in microseconds, and what the scene leaves out. One pinned core."""
     case = chosen_case(scene, method, body, nodes)
-    with compiling(errors, "measuring") as report, watching(report):
+    with compiling("measuring") as report, watching(report):
         costs = measured(case)
     if csv is not None:
         write_table(csv, costs)

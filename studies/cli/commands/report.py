@@ -8,7 +8,7 @@ import typer
 from studies.base.errors import StudyError
 from studies.catalog import STUDIES
 from studies.cli import terminal
-from studies.cli.terminal import PROGRAM, Results, say, warn
+from studies.cli.terminal import PROGRAM, Results, busy, say, warn
 from studies.exchange.entry import entry_files
 from studies.metrics.table import check_columns
 from studies.report import results as reports
@@ -34,7 +34,8 @@ def report(
         if not own and not entry_files(results):
             raise StudyError(f"nothing of {name} is stored in {results}; run `organbench run {name}` first")
     more = [study for study in named.values() if study not in STUDIES]
-    written, remarks = reports.report(Ledger(results), [*STUDIES, *more], [*named.values()] or None)
+    with busy("drawing charts, tables and the page"):
+        written, remarks = reports.report(Ledger(results), [*STUDIES, *more], [*named.values()] or None)
     if figures:
         written += reports.draw_figures(results)
     warn(remarks)

@@ -9,7 +9,7 @@ import typer
 from studies.base.errors import StudyError
 from studies.base.lookup import lookup
 from studies.catalog import Study
-from studies.cli.terminal import Results, StudyName, console, say, warn
+from studies.cli.terminal import Results, StudyName, busy, console, say, warn
 from studies.exchange.entry import entries_beside
 from studies.metrics.cells import MISSING, UNCONVERGED_NOTE, UNRESOLVED_NOTE, plain, value_cell
 from studies.metrics.metric import Metric
@@ -43,7 +43,8 @@ def table(
     metrics_by_name = {m.name: m for m in (*METRICS, *own)}
     chosen = [lookup(name.strip(), metrics_by_name, "metric") for name in metrics.split(",")] if metrics else own
     references = References(Ledger(results))
-    rows, remarks = table_rows(references, entry, chosen)
+    with busy(f"reading the records of {entry.name}"):
+        rows, remarks = table_rows(references, entry, chosen)
     entries, unreadable = entries_beside(results, entry.scenes, references.of)
     rows += [row_of(run, chosen) for run in entries]
     if not rows:

@@ -1,10 +1,13 @@
 """Progress on the terminal."""
 
 import io
+import time
 
 import pytest
 from rich.console import Console
 
+from studies.cli import progress as shown
+from studies.cli import terminal
 from studies.cli.progress import QUIET_SECONDS, TerminalProgress, words
 from studies.sweep.plan import PHYSICS, Planned
 
@@ -41,3 +44,13 @@ def test_a_log_has_one_line_on_compiling_and_then_rests():
             progress.compiling(name)
     assert lines(console) == ["compiling free_frame (kept for the next time)"]
     assert QUIET_SECONDS > 1
+
+
+def test_a_log_hears_of_a_long_piece(monkeypatch):
+    monkeypatch.setattr(terminal, "QUIET_SECONDS", 0.01)
+    monkeypatch.setattr(shown, "QUIET_SECONDS", 0.0)
+    console = log()
+    with TerminalProgress(console) as progress:
+        progress.begin(PHYSICS, 3)
+        time.sleep(0.2)
+    assert "physics 0/3 done, 1 s" in lines(console)
