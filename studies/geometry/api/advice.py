@@ -10,7 +10,7 @@ from studies.base.errors import StudyError
 from studies.geometry.api.scans import scan, wall_of
 from studies.geometry.doctor.examine import Findings, examine
 from studies.geometry.doctor.findings import COMMAND, REMARKS, TRY
-from studies.geometry.files.units import LARGEST, SMALLEST, Source, stem_of
+from studies.geometry.files.units import ORGAN, SMALLEST, Source, stem_of
 
 NODES = 550
 OPENINGS, FOLDS = 5e-3, 3e-3
@@ -33,7 +33,7 @@ def with_command(source: Source, diagnosis: Findings) -> Findings:
     if source.unit is None and not diagnosis.measures["unit_said"]:
         source = replace(source, unit=diagnosis.measures["unit"])
     works, attempts, measures = None, dict[str, Findings | None](), diagnosis.measures
-    if not codes & BEYOND and measures["triangles"] <= MOST and SMALLEST <= max(measures["size"]) <= LARGEST:
+    if not codes & BEYOND and measures["triangles"] <= MOST and SMALLEST <= max(measures["size"]) <= ORGAN[1]:
         for how in ways(codes, wall_of(source) if measures["lumens"] else None):
             body = attempts[options(how)] = examined(source, how)
             if body is not None and body.clean:
