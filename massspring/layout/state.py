@@ -75,6 +75,6 @@ class State:
 def new_diagnostics(obstacles: int, attachments: int, stage_times: StageTimes = UNTIMED) -> FrameDiagnostics:
     """Diagnostics at zero; the stage times go on."""
     singular, limited, iterations = (np.zeros(size, dtype=np.int64) for size in (1, 1, 2))
-    return FrameDiagnostics(
-        np.zeros((obstacles, 3)), np.zeros((attachments, 3)), singular, limited, iterations, stage_times
-    )
+    contact, held = np.zeros((obstacles, 3)), np.zeros((attachments, 3))
+    earlier = np.full_like(contact, np.nan), np.full_like(held, np.nan)
+    return FrameDiagnostics(contact, held, *earlier, np.zeros(1), singular, limited, iterations, stage_times)

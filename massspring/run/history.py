@@ -1,29 +1,25 @@
 """The record of a run, frame by frame."""
 
-from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.sparse import csr_array
 
 from massspring.body.body import Body
-from massspring.errors import MassSpringError
-from massspring.kernels.forces.springs import membrane_energy, spring_energy
 from massspring.kernels.probe.arrays import COUNTS
 from massspring.layout.facet_rows import facet_rule
 from massspring.layout.probe_arrays import tip_depth
 from massspring.layout.state import State
+from massspring.run.energy import EnergyAccount, elastic_energy, kinetic_energy
 from massspring.world.clock import Clock
 from massspring.world.obstacles import Obstacle, Probe
 
-EXTRA = ("kinetic", "elastic")
-"""Optional fields: they take a pass over all nodes and springs after every frame, and only an energy balance needs
-them."""
+ENERGIES = ("kinetic", "elastic", "tissue_kinetic", "work")
 
 
 @dataclass(frozen=True, eq=False)
 class History:
-    """F frames; entries after an early end are NaN, and so are extra fields that were not asked for."""
+    """F frames; entries after an early end are NaN."""
 
     t: np.ndarray
     """End of each frame [s], (F,)."""
@@ -37,13 +33,18 @@ class History:
     """[J], (F,)."""
     elastic: np.ndarray
     """Above the rest state [J], (F,)."""
+    tissue_kinetic: np.ndarray
+    """With the masses of the tissue, where the body moves by others [J], (F,)."""
+    work: np.ndarray
+    """Done on the body by obstacles, attachments, gravity, fills and events, and its energy at the start [J], (F,):
+    damping and friction only lower kinetic + elastic − work. NaN for a method that stores energy in other ways too."""
     contact_force: np.ndarray
-    """Mean force of each obstacle on the body during the frame [N], (F, o, 3)."""
+    """Force of each obstacle on the body at the end of the frame [N], (F, o, 3)."""
     penetration: np.ndarray
     """Penetration of the deepest surface node, or point inside a facet of a quadratic body, into each obstacle at the
     end of the frame, for a thin probe of the surface [m], (F, o)."""
     held_force: np.ndarray
-    """Mean force of each attachment on the body during the frame [N], (F, g, 3)."""
+    """Force of each attachment on the body at the end of the frame [N], (F, g, 3)."""
     min_j: np.ndarray
     """Smallest J of an element [1], (F,); NaN for a surface body."""
     snapshot_frames: np.ndarray
@@ -121,20 +122,6 @@ class Numbers:
         return volumes * (whole[self.volumes] / together[self.volumes])
 
 
-def kinetic_energy(state: State) -> float:
-    """[J]."""
-    v = state.nodes.v.astype(np.float64, copy=False)
-    # Not by `@`: a pool of threads that has computed a product waits for the next at the expense of frames.
-    return 0.5 * float(np.einsum("i,ij,ij->", state.model.mass, v, v))
-
-
-def elastic_energy(state: State) -> float:
-    """Energy of springs and membrane [J], including that of taut springs at rest."""
-    net, x = state.model, state.nodes.x.astype(np.float64, copy=False)
-    taut = spring_energy(x, net.ends, net.rest_length, net.stiffness)
-    return taut + membrane_energy(x, net.membrane)
-
-
 def passage(before: State, was: Body, after: State, now: Body, ns: int) -> Passage:
     """The changes by an event that replaced body `was` in state `before` by body `now` in state `after`; `ns`: its wall
     time."""
@@ -153,8 +140,7 @@ def _over(part: float, whole: float) -> float:
 
 
 class Recorder:
-    """Fills the arrays of a History. It computes only those fields of `EXTRA` that are in `extra`. Raises
-    MassSpringError for an unknown extra field."""
+    """Fills the arrays of a History."""
 
     def __init__(
         self,
@@ -163,18 +149,12 @@ class Recorder:
         obstacles: tuple[Obstacle, ...],
         attachments: int,
         keep: frozenset[int],
-        extra: Collection[str] = EXTRA,
     ) -> None:
         frames = clock.frames
-        unknown = sorted(set(extra) - set(EXTRA))
-        if unknown:
-            raise MassSpringError(f"no extra field is called '{unknown[0]}'; there are {', '.join(EXTRA)}")
-        self.extra = frozenset(extra)
         self.body = body
         self.clock = clock
-        self.rest_energy = body.rest_energy
         self.t = clock.frame * np.arange(1, frames + 1)
-        self.scalars = {name: np.full(frames, np.nan) for name in ("kinetic", "elastic", "min_j")}
+        self.scalars = {name: np.full(frames, np.nan) for name in (*ENERGIES, "min_j")}
         self.volumes = body.kept
         self.volume, self.pressure, self.volume_target = (
             np.full((frames, self.volumes.count), np.nan) for _ in range(3)
@@ -204,12 +184,10 @@ class Recorder:
         x = x if numbers is None else numbers.carried(x)
         self.volume[frame] = self.volumes.measure(x)
         self.pressure[frame] = state.lam if numbers is None else state.lam[numbers.volumes]
-        if "kinetic" in self.extra:
-            self.scalars["kinetic"][frame] = kinetic_energy(state)
-        if "elastic" in self.extra:
-            self.scalars["elastic"][frame] = elastic_energy(state) - self.rest_energy + self.body.local_energy(x)
         self.scalars["min_j"][frame] = self.body.smallest_ratio(x)
-        self.contact_force[frame, self.rank] = state.diagnostics.contact_impulse / self.clock.frame
+        done = state.diagnostics
+        self.contact_force[frame, self.rank] = self._at_end(done.contact_impulse, done.earlier_contact, steps)
+        self.held_force[frame] = self._at_end(done.held_impulse, done.earlier_held, steps)
         for o, obstacle in enumerate(self.obstacles):
             t = float(self.t[frame])
             if isinstance(obstacle, Probe):
@@ -220,7 +198,6 @@ class Recorder:
                 touched = np.concatenate([x[self.surface_nodes], points])
                 depth = -obstacle.gap(touched, t).min()
             self.penetration[frame, o] = max(0.0, depth)
-        self.held_force[frame] = state.diagnostics.held_impulse / self.clock.frame
         self.steps[frame], self.frame_ns[frame] = steps, elapsed_ns
         self.singular += int(state.diagnostics.singular[0])
         self.limited += int(state.diagnostics.limited[0])
@@ -230,6 +207,19 @@ class Recorder:
         self.final = x
         if frame + 1 in self.keep:
             self.kept[frame + 1] = x
+
+    def _at_end(self, impulse: np.ndarray, earlier: np.ndarray, steps: int) -> np.ndarray:
+        """The force [N] at the end of a frame of so many steps from its impulse [N s], all and before the last step,
+        (k, 3): on the line through the means of the last step and of those before it, each in the middle of its
+        time."""
+        dt = self.clock.frame / steps
+        last = (impulse - earlier) / dt
+        return last if steps == 1 else last + (last - earlier / (dt * (steps - 1))) / steps
+
+    def record_energy(self, frame: int, account: EnergyAccount) -> None:
+        """Records the energies after a frame."""
+        for name in ENERGIES:
+            self.scalars[name][frame] = getattr(account, name)
 
     def record_targets(self, frame: int, targets: np.ndarray, numbers: Numbers | None) -> None:
         """Records the targets of the current volumes after a frame [m³]; parts of a volume that is not yet divided get
@@ -254,6 +244,8 @@ class Recorder:
             pressure=self.pressure,
             kinetic=self.scalars["kinetic"],
             elastic=self.scalars["elastic"],
+            tissue_kinetic=self.scalars["tissue_kinetic"],
+            work=self.scalars["work"],
             contact_force=self.contact_force,
             penetration=self.penetration,
             held_force=self.held_force,

@@ -198,6 +198,7 @@ class Setup:
             position=_tracks([o.anchor + o.path(t) for o in solids], len(t)) - self.origin,
             velocity=_tracks([(o.path(t) - o.path(t - dt)) / dt for o in solids], len(t)),
             held_displacement=_tracks([a.path(t) for a in self.attachments], len(t)),
+            held_velocity=_tracks([(a.path(t) - a.path(t - dt)) / dt for a in self.attachments], len(t)),
             volume_target=self.volume_targets(t, easing),
             tips=Tips(*(_tracks([p.anchor + p.path(u) for p in probes], len(t)) - self.origin for u in (t - dt, t))),
         )

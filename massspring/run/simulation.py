@@ -1,7 +1,7 @@
 """Frame by frame: moves the obstacles, advances the method, records. The only Python in the loop is once per frame."""
 
 import math
-from collections.abc import Callable, Collection, Iterable
+from collections.abc import Callable, Iterable
 from time import perf_counter_ns, thread_time_ns
 
 import numpy as np
@@ -9,7 +9,8 @@ import numpy as np
 from massspring.body.body import Body
 from massspring.layout.state import State
 from massspring.run.checks import check_loads, check_probes, check_slip
-from massspring.run.history import EXTRA, History, Recorder, passage
+from massspring.run.energy import EnergyAccount
+from massspring.run.history import History, Recorder, passage
 from massspring.run.loaded_steps import LoadedSteps
 from massspring.run.setup import Setup
 from massspring.run.stages import stages_of
@@ -34,28 +35,26 @@ def simulate(
     snapshots: Iterable[int] = (),
     on_frame: Callable[[int], object] | None = None,
     time_limit: float = math.inf,
-    extra: Collection[str] = EXTRA,
 ) -> History:
     """Runs all frames, or up to the first that diverges, and returns the history.
 
     `snapshots`: numbers (1 … F) of the frames after which positions are kept. `on_frame(number)` is called after each.
-    A run that takes more than `time_limit` [s] of this thread's processor time ends early. `extra`: which of
-    `history.EXTRA` are recorded; raises MassSpringError for another name. Frame times are those of the
+    A run that takes more than `time_limit` [s] of this thread's processor time ends early. Frame times are those of the
     steps and of finding how many they are.
     """
     keep = frozenset(snapshots)
     now, *later = stages = stages_of(setup)
-    recorder = Recorder(stages[-1].setup.body, setup.clock, setup.obstacles, len(setup.attachments), keep, extra)
+    recorder = Recorder(stages[-1].setup.body, setup.clock, setup.obstacles, len(setup.attachments), keep)
     recorder.volume_target[:] = stages[-1].setup.volume_targets(recorder.t)
     state = now.start
     begun = thread_time_ns()
-    loaded = LoadedSteps(now.setup, state)
+    loaded, account = LoadedSteps(now.setup, state), EnergyAccount(now.setup, state)
     for frame in range(setup.clock.frames):
         if later and frame == later[0].frame:
             begin, before, was = perf_counter_ns(), state, now.setup.body
             now = later.pop(0).entered(state)
             state = now.start
-            loaded = LoadedSteps(now.setup, state)
+            loaded, account = LoadedSteps(now.setup, state), account.entered(now.setup, state)
             recorder.passages.append(passage(before, was, state, now.setup.body, perf_counter_ns() - begin))
         state = now.let_in(state, frame)
         boundary = now.boundary(frame, loaded.steps)
@@ -71,7 +70,9 @@ def simulate(
         reason = check_probes(state, setup.obstacles)
         if reason is not None:
             return recorder.stopped(frame, "blocked", reason)
+        account.add(state, steps)
         recorder.record(frame, state, steps, elapsed, now.last)
+        recorder.record_energy(frame, account)
         if setup.events:
             recorder.record_targets(frame, now.targets_after(frame), now.last)
         if on_frame is not None:

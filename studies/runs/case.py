@@ -31,13 +31,14 @@ class Case:
     """Time step [s], or "auto": `dt_fraction` of the stability limit."""
     dt_fraction: float = 0.5
     frames: int | None = None
-    """Instead of the scene's number of frames; the duration stays."""
+    """Instead of the scene's number of frames; the duration stays. A few more are taken where that lets a frame end at
+    each checkpoint."""
     beyond_limit: bool = False
     """Whether a step above the stability limit is allowed; otherwise it is refused."""
     precision: Literal["float64", "float32"] = "float64"
     """Precision of the mass-spring state; float32 only for methods that support it."""
     recorded: tuple[str, ...] = ()
-    """Additional fields that metrics do not use: the energies of `massspring.run.history.EXTRA`, and "surface",
+    """Additional fields that metrics do not use: "surface",
     positions of the outer surface for a replay (studies.runs.surface_frames)."""
     timed: bool = False
     """Whether frame times are measured by the timing protocol."""

@@ -6,11 +6,10 @@ from numbers import Real
 from typing import Any
 
 from massspring import MassSpringError
-from massspring.run.history import EXTRA
 from massspring.run.precision import check_precision
 from studies.base.errors import StudyError
 
-RECORDABLE = (*EXTRA, "surface")
+RECORDABLE = ("surface",)
 """Fields that a case may record on request: energies, and positions of the outer surface for a replay."""
 
 
@@ -40,7 +39,7 @@ def check_settings(case: Any) -> None:
     except MassSpringError as error:
         raise StudyError(str(error)) from error
     if not isinstance(case.recorded, tuple):
-        raise StudyError(f"recorded is {case.recorded!r}; give a tuple, such as ({EXTRA[0]!r},)")
+        raise StudyError(f"recorded is {case.recorded!r}; give a tuple, such as ({RECORDABLE[0]!r},)")
     unknown = sorted(set(case.recorded) - set(RECORDABLE))
     if unknown:
         raise StudyError(f"no extra field is called '{unknown[0]}'; there are {', '.join(RECORDABLE)}")

@@ -23,6 +23,18 @@ LOCKS = 2.0
 """Bound of the number of unknowns per kept volume. The continuum has three; one volume per tetrahedron gives 0.6."""
 
 
+SHAKES, FEEDS = 0.003, 0.001
+"""Energy that a body gains by itself, over its largest energy: bound of every run, and of one that swings while nothing
+moves it. Sound runs gain up to 0.0006; a kidney between planes whose contact lags behind its volumes by a step gains
+0.005 at 0.8 of the step limit and is 7 % wrong, at 0.6 of it 0.0015 and 2 %."""
+WAVERS = 0.03
+"""Of the kinetic energy: explicit steps keep the energy of a free swing within so much, to either side."""
+SWINGS = 0.01
+"""Bound of the swing at rest: of displacements it is the target of the mean error."""
+MOVES, PACE = 1e-3, 0.02
+"""Kinetic energy over the largest energy from which a run shows a motion, and bound of the error of its pace."""
+
+
 def indicators(scene: Scene, body: Body, history: History, lumen: int, keeps: bool) -> dict[str, float]:
     """Attributes of a run (RUN_ATTRIBUTES); NaN if they do not apply. lumen: column of the lumen, or −1; keeps: whether
     the method claims to keep volumes."""
@@ -33,7 +45,44 @@ def indicators(scene: Scene, body: Body, history: History, lumen: int, keeps: bo
         "alternation": float(alternation / scene.tissue.shear_modulus),
         "volume_off": volume_off(history) if keeps else np.nan,
         "sway": sway(scene, history.t[: history.good_frames], history.contact_force, history.held_force),
+        "gained": gained(history),
+        "swing": swing(scene, history),
+        "pace": pace(history),
     }
+
+
+def largest_energy(history: History) -> float:
+    """Of the body, or work that it took [J]; NaN without a frame."""
+    sizes = history.kinetic + history.elastic, np.abs(history.work)
+    return float(np.nanmax(sizes)) if history.good_frames and np.isfinite(history.work[0]) else float("nan")
+
+
+def gained(history: History) -> float:
+    """Largest rise of kinetic + elastic energy less the work done on the body, over its largest energy [1]: damping and
+    friction can only lower it. WAVERS of the largest kinetic energy is not counted. NaN where the work is unknown."""
+    balance = np.concatenate([[0.0], history.kinetic + history.elastic - history.work])[: history.good_frames + 1]
+    wavers = WAVERS * float(history.kinetic[: history.good_frames].max(initial=0.0))
+    rise = float((balance - np.minimum.accumulate(balance)).max())
+    return max(rise - wavers, 0.0 * rise) / (largest_energy(history) or np.inf)
+
+
+def swing(scene: Scene, history: History) -> float:
+    """Root of the kinetic over the largest energy in the last quarter of the frames in which all loads are at rest [1],
+    about the share of its displacement by which the body still moves; NaN where no frame is at rest."""
+    t = history.t[: history.good_frames]
+    still = np.flatnonzero(t > still_from(scene))
+    last = still[-min(STILL_FRAMES, max(1, len(still) // 4)) :]
+    most = largest_energy(history)
+    return float(np.sqrt(history.kinetic[last].max() / (most or np.inf))) if len(still) else float("nan")
+
+
+def pace(history: History) -> float:
+    """How many times as fast as with the masses of the tissue the body moves when it moves most [1] (Rayleigh's
+    quotient of its velocities); 1 for a run through equilibria, which shows no motion."""
+    if not history.good_frames or not np.nanmax(history.kinetic) > MOVES * largest_energy(history):
+        return 1.0
+    most = int(np.nanargmax(history.kinetic))
+    return float(np.sqrt(history.tissue_kinetic[most] / history.kinetic[most]))
 
 
 def remarks(signs: dict[str, float]) -> list[str]:
@@ -49,7 +98,15 @@ def remarks(signs: dict[str, float]) -> list[str]:
         )
     if signs["sway"] > SWAYS:
         percent = 100 * signs["sway"]
-        lines.append(f"the force oscillates by {percent:.2g} % at the end while nothing outside moves; halve the step")
+        lines.append(
+            f"the force oscillates by {percent:.2g} % at the end while nothing outside moves; {way_out(signs)}"
+        )
+    elif signs["swing"] > SWINGS:
+        percent = 100 * signs["swing"]
+        lines.append(f"the body swings by {percent:.2g} % at the end while nothing outside moves; {way_out(signs)}")
+    if abs(signs["pace"] - 1.0) > PACE:
+        share, how = 100 * abs(signs["pace"] - 1.0), "fast" if signs["pace"] > 1.0 else "slow"
+        lines.append(f"the motion is {share:.0f} % too {how}, by masses that are not the tissue's; take mass='lumped'")
     if signs["volume_off"] > VOLUME_OFF:
         lines.append(
             f"the kept volume is up to {100 * signs['volume_off']:.2g} % off (bound {100 * VOLUME_OFF:g} %); a body "
@@ -62,6 +119,11 @@ def volume_off(history: History) -> float:
     """Largest |V/V0 − 1| [1] of all kept volumes together after any good frame; NaN without one."""
     volume, target = (values[: history.good_frames].sum(axis=1) for values in (history.volume, history.volume_target))
     return float(np.abs(volume / target - 1.0).max(initial=0.0)) if len(volume) else float("nan")
+
+
+def way_out(signs: dict[str, float]) -> str:
+    """What ends an oscillation: that of a sound run decays."""
+    return "halve the step" if signs["gained"] > FEEDS else "give the scene more damping or more time at rest"
 
 
 def neighbours(kept: Volumes | PointVolumes, lumen: int) -> np.ndarray:

@@ -57,7 +57,7 @@ from studies.runs.recipes import (
     TetrahedralBody,
 )
 from studies.runs.user_code import own_laws, sprung_by
-from studies.scene.clock import event_frames
+from studies.scene.clock import event_frames, frames_between
 from studies.scene.scene import Scene
 
 WHOLE = "whole"
@@ -227,7 +227,7 @@ def prepared_on(case: Case, mesh: OrganMesh | QuadraticMesh) -> Prepared:
     check_applies(case, body, bool(targets))
     if isinstance(case.body, SurfaceBody | MembraneBody) and mesh.hollow:
         mesh = mesh.outer()
-    attachments, last, frames = attachments_for(scene, mesh), body, case.frames or scene.frames
+    attachments, last, frames = attachments_for(scene, mesh), body, frames_between(scene, case.frames or scene.frames)
     events, opening, limit_before, tissue = (), None, None, None
     if scene.cuts:
         events, opening, mesh, tissue = cut_of(case, given, body, bool(targets))
@@ -260,7 +260,8 @@ def cut_of(
     """(events at which the cuts open a body on its mesh, the final Opening, the final mesh, the tissue of a body with
     virtual nodes). Raises StudyError, MassSpringError."""
     scene, recipe = case.scene, case.body
-    ways = [event_frames(scene, cut, case.frames or scene.frames) for cut in scene.cuts]
+    most = frames_between(scene, case.frames or scene.frames)
+    ways = [event_frames(scene, cut, most) for cut in scene.cuts]
     frames = sorted(set().union(*ways))
     shares = np.array([[_share(frame, way[0], way[-1]) for way in ways] for frame in frames])
     stages = _stages(scene, recipe, mesh, shares)

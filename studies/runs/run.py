@@ -11,7 +11,6 @@ from pathlib import Path
 import numpy as np
 
 from massspring import History, MassSpringError, simulate
-from massspring.run.history import EXTRA
 from studies.base.compile_watch import watching
 from studies.base.errors import DoesNotApply, StudyError
 from studies.geometry.mesh.organ_mesh import tetrahedron_volumes
@@ -51,8 +50,7 @@ def measure(case: Case, on_frame: Callable[[int], object] | None = None) -> Reco
         try:
             prepared = prepare(case)
             # Attachments that overlap, or hold no node, are detected only when the run starts.
-            extra = [name for name in case.recorded if name in EXTRA]
-            history = simulate(prepared.setup, snapshot_frames(case, prepared), on_frame, TIME_LIMIT, extra)
+            history = simulate(prepared.setup, snapshot_frames(case, prepared), on_frame, TIME_LIMIT)
         except DoesNotApply as reason:
             return _record(case, Status.SKIPPED, str(reason), {"warnings": _warning_text(caught)}, {})
         except (StudyError, MassSpringError) as error:
@@ -155,13 +153,15 @@ def _fields(case: Case, prepared: Prepared, history: History) -> dict[str, Field
         "iterations": history.iterations,
         "frame_steps": history.steps,
         "min_j": history.min_j,
+        "kinetic": history.kinetic,
+        "elastic": history.elastic,
+        "work": history.work,
         "snapshot_frame": history.snapshot_frames[at],
         **_shown(prepared, history.snapshots[at]),
     }
     if prepared.opening is not None:
         opening = prepared.opening
         values |= {"cut_faces": opening.faces, "cut_pairs": opening.pairs, "cut_parts": opening.parts}
-    values |= {name: getattr(history, name) for name in case.recorded if name in EXTRA}
     if "surface" in case.recorded:
         values |= surface_fields(prepared, history)
     return new_fields(RUN_FIELDS, values)

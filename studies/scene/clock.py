@@ -11,6 +11,11 @@ from studies.scene.scene import Scene
 MOST_EVENTS = 20
 """Most events of an advancing cut: more take memory and time before the run and do not change the final state."""
 
+MORE, LEAST_MORE = 10, 1000
+"""Most frames over those that were asked for, so that frames end at checkpoints; and the least of this number."""
+SAME = 1e-9
+"""Share of a duration below which two times are the same."""
+
 
 def check_clock(scene: Scene, file: str = "") -> None:
     """Raises StudyError for an impossible duration, number of frames or checkpoints; file: first words of
@@ -31,6 +36,19 @@ def check_clock(scene: Scene, file: str = "") -> None:
             f"{file}scene '{scene.name}': its checkpoints end at {times[-1] if times else None} s and the scene at "
             f"{scene.duration:g} s; a run is compared with its reference at times within the scene"
         )
+
+
+def frames_between(scene: Scene, frames: int) -> int:
+    """The least number from `frames` on of equal frames of which one ends at each checkpoint of the scene. Raises
+    StudyError where MORE times as many are too few."""
+    shares = np.array(scene.checkpoints) / scene.duration
+    for count in range(frames, max(MORE * frames, LEAST_MORE) + 1):
+        if (np.abs(shares * count - np.round(shares * count)) < SAME * count).all():
+            return count
+    raise StudyError(
+        f"scene '{scene.name}': no number of {frames} to {count} equal frames of {scene.duration:g} s ends at the "
+        f"checkpoints {scene.checkpoints} s; round these"
+    )
 
 
 def event_frames(scene: Scene, cut: Cut, frames: int) -> list[int]:

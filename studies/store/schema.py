@@ -31,6 +31,7 @@ class Status(StrEnum):
     DIVERGED = "diverged"  # values not finite, or nodes that left
     FOLDED = "folded"  # J of an element is below 0.1 after a frame
     INVERTED = "inverted"  # J of an element is 0 or less after a frame
+    SHAKEN = "shaken"  # the body gains energy that nothing gives it
     DRIFTED = "drifted"  # a kept volume more than 1 % off
     NOT_CONVERGED = "not-converged"  # the reference found no equilibrium at a checkpoint
     BLOCKED = "blocked"  # a thin probe was driven through tissue that had nowhere to go
@@ -39,7 +40,7 @@ class Status(StrEnum):
     SKIPPED = "skipped"  # the method does not apply to the scene or the body; the message says why
 
 
-COMPARABLE = (Status.OK, Status.FOLDED, Status.INVERTED, Status.DRIFTED)
+COMPARABLE = (Status.OK, Status.FOLDED, Status.INVERTED, Status.SHAKEN, Status.DRIFTED)
 """Statuses of runs that reach the last checkpoint: all their frames can be compared and timed."""
 WITHOUT_FIELDS = (Status.FAILED, Status.SKIPPED)
 """Nothing was computed: such a record has no fields, and no attributes but warnings."""
@@ -74,9 +75,9 @@ class RunFields(Table):
     volume = array("F m", NUMBER, "m^3", "enclosed volume, one column per kept volume")
     volume_target = array("F m", NUMBER, "m^3", "what each kept volume should be")
     pressure = array("F m", NUMBER, "Pa", "multiplier of each kept volume in the last step of the frame")
-    contact_force = array("F o 3", NUMBER, "N", "force of each obstacle on the body, mean of the frame")
+    contact_force = array("F o 3", NUMBER, "N", "force of each obstacle on the body at the end of the frame")
     penetration = array("F o", NUMBER, "m", "depth of the deepest surface node, or point in a facet, in each obstacle")
-    held_force = array("F g 3", NUMBER, "N", "force of each held region on the body, mean of the frame")
+    held_force = array("F g 3", NUMBER, "N", "force of each held region on the body at the end of the frame")
     iterations = array("F 2", INDEX, "1", "for the multipliers: sum of the frame, most in a step")
     frame_steps = optional_array(
         "F", INDEX, "1", "steps of each frame: more than at rest where a load lowers the limit"
@@ -89,7 +90,8 @@ class RunFields(Table):
     triangles = array("s 3", INDEX, "1", "nodes of each surface triangle, outward")
     tetrahedra = array("c 4", INDEX, "1", "nodes of each tetrahedron")
     kinetic = optional_array("F", NUMBER, "J", "kinetic energy")
-    elastic = optional_array("F", NUMBER, "J", "energy of the springs")
+    elastic = optional_array("F", NUMBER, "J", "elastic energy")
+    work = optional_array("F", NUMBER, "J", "work of obstacles, held regions, gravity and fills since the start")
     cut_faces = optional_array("u 3", INDEX, "1", "surface triangles behind the cut")
     cut_pairs = optional_array("p 2", INDEX, "1", "nodes behind the cut and in front of it, at one place at rest")
     cut_parts = optional_array("m", INDEX, "1", "the piece of the cut body that each kept volume is in")
@@ -136,6 +138,9 @@ class RunAttributes(Timed):
     alternation = optional_value(float, "1", "rms of pressure less the mean of its neighbours', over mu")
     volume_off = optional_value(float, "1", "largest error of all kept volumes together after any frame")
     sway = optional_value(float, "1", "range of the force at rest about its trend, over its mean")
+    gained = optional_value(float, "1", "energy that the body gains by itself, over its largest energy")
+    swing = optional_value(float, "1", "root of the kinetic over the largest energy at the end, where loads rest")
+    pace = optional_value(float, "1", "how many times as fast as with the masses of the tissue the body moves")
     warnings = value(str, "", "what preparing the case warned of, and what its indicators report")
     entry = optional_value(str, "", "of an entry from outside: its file, with the SHA-256 of its positions")
     entry_seconds = optional_value(float, "s/s", "of an entry from outside: computing time for a simulated second")

@@ -225,6 +225,8 @@ class BoundaryConditions(NamedTuple):
     """Of the obstacles, mean over each step [m/s], (q, o, 3)."""
     held_displacement: np.ndarray
     """Of the attachments at the end of each step [m], (q, g, 3)."""
+    held_velocity: np.ndarray
+    """Of the attachments, mean over each step [m/s], (q, g, 3)."""
     volume_target: np.ndarray
     """Target of each kept volume at the end of each step [m³], (q, m)."""
     tips: Tips
@@ -247,6 +249,12 @@ class FrameDiagnostics(NamedTuple):
     """Impulse of each obstacle on the body [N s], those of thin probes last, (o + p, 3)."""
     held_impulse: np.ndarray
     """Impulse of each attachment on the body [N s], (g, 3)."""
+    earlier_contact: np.ndarray
+    """`contact_impulse` before the last step of the frame, (o + p, 3); NaN where the method does not look back."""
+    earlier_held: np.ndarray
+    """`held_impulse` before the last step of the frame, (g, 3); NaN where the method does not look back."""
+    work: np.ndarray
+    """Of obstacles and attachments on the body before the last step of the frame [J], (1,)."""
     singular: np.ndarray
     """Steps in which a volume with an error had no gradient, so that no pressure could act, (1,) int64."""
     limited: np.ndarray

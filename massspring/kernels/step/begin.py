@@ -5,7 +5,7 @@ from massspring.kernels.fused.chunk import pad_positions
 from massspring.kernels.fused.sweep import predict_from_places
 from massspring.kernels.jit.decorators import compiled, njit_exposed, njit_inlined, njit_lean
 from massspring.kernels.jit.stage_clock import BETWEEN_FRAMES, HELD, MULTIPLIER, REVISION, SEARCH, SPRINGS, end_stage
-from massspring.kernels.jit.vec3 import add_to, row, times
+from massspring.kernels.jit.vec3 import add_to, dot, minus, put, row, times
 
 
 @njit_lean
@@ -44,6 +44,33 @@ def add_to_prediction(model, nodes, force, dt):
         add_to(nodes.force, i, row(force, i))
 
 
+@njit_inlined
+def worked(impulse, earlier, velocity, step):
+    """Work [J] of the impulses (k, 3) of step − 1 at the velocities (q, k, 3) of that step; then keeps the impulses."""
+    work = 0.0
+    for k in range(velocity.shape[1]):
+        if step > 0:
+            work += dot(minus(row(impulse, k), row(earlier, k)), row(velocity[step - 1], k))
+        put(earlier, k, row(impulse, k))
+    return work
+
+
+@njit_exposed
+def look_back(diagnostics, boundary, step):
+    """Adds the work of the step before, and keeps the impulses so far: at the end of a frame, the rest is of its last
+    step."""
+    o, tips = boundary.velocity.shape[1], boundary.tips
+    contact, earlier = diagnostics.contact_impulse, diagnostics.earlier_contact
+    work = worked(contact, earlier, boundary.velocity, step)
+    work += worked(diagnostics.held_impulse, diagnostics.earlier_held, boundary.held_velocity, step)
+    for p in range(tips.end.shape[1]):
+        if step > 0:
+            way = minus(row(tips.end[step - 1], p), row(tips.start[step - 1], p))
+            work += dot(minus(row(contact, o + p), row(earlier, o + p)), times(1.0 / boundary.dt, way))
+        put(earlier, o + p, row(contact, o + p))
+    diagnostics.work[0] += work
+
+
 @njit_exposed
 def open_frame(frame):
     """Records the time between two frames, and pads the positions for the first step."""
@@ -58,6 +85,7 @@ def begin_step(frame, step, keeps):
     Returns V [m³] and G·W·G [m⁴/kg].
     """
     model, nodes, boundary = frame.model, frame.nodes, frame.boundary
+    look_back(frame.diagnostics, boundary, step)
     volume, _, mobility = predict_from_places(model, nodes, frame.work, boundary, keeps)
     end_stage(frame.diagnostics.stage_times, SPRINGS)
     held = boundary.held_displacement[step]
@@ -72,6 +100,7 @@ def begin_step(frame, step, keeps):
 def begin_summed_step(frame, step):
     """`begin_step` with G, which also sums G·v* [m³/s] over all nodes in the same pass: (V, G·v*, G·W·G)."""
     model, nodes, boundary = frame.model, frame.nodes, frame.boundary
+    look_back(frame.diagnostics, boundary, step)
     volume, flow, mobility = predict_from_places(model, nodes, frame.work, boundary, True)
     end_stage(frame.diagnostics.stage_times, SPRINGS)
     flow += prescribe(model, nodes, boundary.held_displacement[step], boundary.dt)

@@ -9,6 +9,7 @@ from massspring.kernels.contact.active_set import release_all
 from massspring.kernels.contact.friction import activate_edges
 from massspring.kernels.contact.node_contact import FREE, HIDDEN, ON_EDGE, SLIDES, STICKS
 from massspring.kernels.jit.stage_clock import INTEGRATION, end_stage
+from massspring.kernels.step.begin import look_back
 from massspring.kernels.step.implicit_step import activate_entering
 from massspring.layout.state import State
 from massspring.methods.implicit.factor import Factor
@@ -26,6 +27,7 @@ class LongStep:
         self.boundary, self.step = boundary, step
         self.model, self.nodes, self.contacts = state.model, state.nodes, state.contacts
         self.diagnostics = state.diagnostics
+        look_back(self.diagnostics, boundary, step)
         # The start is predicted without gravity: passes that start in equilibrium must stay there, or few passes would
         # be biased.
         self.p = self.nodes.x + boundary.dt * self.nodes.v

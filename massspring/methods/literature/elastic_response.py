@@ -20,6 +20,7 @@ import numpy as np
 from massspring.body.body import Body
 from massspring.errors import MassSpringError
 from massspring.kernels.arrays.layout import BoundaryConditions, Model
+from massspring.kernels.step.begin import look_back
 from massspring.layout.allocate import start
 from massspring.layout.state import State
 from massspring.methods.capabilities import Capabilities, No
@@ -91,6 +92,7 @@ class ElasticResponse(Method):
         held, nodes, diagnostics = memory.held, after.nodes, after.diagnostics
         weighed = held.rest + (memory.sag @ boundary.gravity).reshape(-1, 3)
         for step in range(len(boundary.position)):
+            look_back(diagnostics, boundary, step)
             free = weighed + (held.follow @ boundary.held_displacement[step].ravel()).reshape(-1, 3)
             pressed = press(after, boundary, step, free, Columns(memory))
             diagnostics.held_impulse[:] += held.held_impulse((pressed.end - held.rest).ravel(), boundary)

@@ -26,6 +26,7 @@ from scipy.sparse.linalg import eigsh
 from massspring.body.body import Body
 from massspring.errors import MassSpringError
 from massspring.kernels.arrays.layout import BoundaryConditions
+from massspring.kernels.step.begin import look_back
 from massspring.layout.allocate import start
 from massspring.layout.state import State
 from massspring.methods.capabilities import Capabilities, No
@@ -162,6 +163,7 @@ class Motion:
     def take(self, step: int) -> None:
         """Makes one step and adds the impulses of obstacles and attachments."""
         boundary, modes, state = self.boundary, self.modes, self.state
+        look_back(state.diagnostics, boundary, step)
         place = boundary.held_displacement[step].ravel()
         speed = (place - self.place) / boundary.dt
         self.p -= modes.carried @ (speed - self.speed)

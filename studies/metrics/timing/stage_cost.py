@@ -23,7 +23,8 @@ from massspring.kernels.jit.stage_clock import (
     end_stage,
     new_stage_times,
 )
-from massspring.run.history import EXTRA, Recorder
+from massspring.run.energy import EnergyAccount
+from massspring.run.history import Recorder
 from massspring.run.loaded_steps import LoadedSteps
 from massspring.run.simulation import check_state
 from massspring.run.stages import Stage
@@ -45,8 +46,6 @@ CALL = "call of the frame"
 the load tells how many steps a frame needs, also for finding that."""
 ROWS = (*STAGES, CALL)
 PATHS, RECORDING = "paths of obstacles and targets", "recording"
-ENERGIES = "energies: no metric reads them"
-"""Row for the energies, which are not recorded unless a case needs them."""
 PLAIN, TIMED = "as it is", "with marks"
 STAGE, SKIPPED, FRAME = "stage", "skipped", "per frame"
 
@@ -123,7 +122,7 @@ def cost_table(case: Case, frames: int = FRAMES, repeats: int = REPEATS, budget:
     rows += [(STAGE, "rest, not attributed", step - float(stages.sum()), ""), (STAGE, "whole step", step, "")]
     end = turns[PLAIN][0][2]
     rows += [(SKIPPED, skip.name, whole[skip.name] - step, skip.remark(setup, end)) for skip in skipped]
-    rows += [(SKIPPED if name == ENERGIES else FRAME, name, to_step * ns, "") for name, ns in outside.items()]
+    rows += [(FRAME, name, to_step * ns, "") for name, ns in outside.items()]
     table = pd.DataFrame(rows, columns=["kind", "what", "µs per step", "how much"])
     table.attrs["turns"] = len(turns[PLAIN])
     table.insert(3, "share of the step", table["µs per step"] / step)
@@ -164,17 +163,20 @@ def _fastest(timed: list[TimedFrames]) -> np.ndarray:
 
 
 def _per_frame(setup: Setup) -> dict[str, float]:
-    """Time of the work once per frame, outside the frame time, and the extra time to record energies: medians [ns]."""
-    clock = setup.clock
-    recorded = (setup.body, clock, setup.obstacles, len(setup.attachments), frozenset[int]())
-    bare, full = Recorder(*recorded, ()), Recorder(*recorded, EXTRA)
-    state = setup.method.advance(setup.start(), setup.boundary(0))
-    times = np.zeros((3, clock.frames))
+    """Time of the work once per frame, outside the frame time: medians [ns]."""
+    clock, begun = setup.clock, setup.start()
+    recorder = Recorder(setup.body, clock, setup.obstacles, len(setup.attachments), frozenset[int]())
+    account, state = EnergyAccount(setup, begun), setup.method.advance(begun, setup.boundary(0))
+    times = np.zeros((2, clock.frames))
+
+    def recording(frame: int) -> None:
+        account.add(state, clock.steps)
+        recorder.record(frame, state, clock.steps, 0)
+        recorder.record_energy(frame, account)
+
     for frame in range(clock.frames):
-        records = [partial(recorder.record, frame, state, clock.steps, 0) for recorder in (bare, full)]
-        for row, work in enumerate([partial(setup.boundary, frame), *records]):
+        for row, work in enumerate([setup.boundary, recording]):
             begin = perf_counter_ns()
-            work()
+            work(frame)
             times[row, frame] = perf_counter_ns() - begin
-    paths, recording, energies = (float(t) for t in np.median(times, axis=1))
-    return {PATHS: paths, RECORDING: recording, ENERGIES: energies - recording}
+    return dict(zip((PATHS, RECORDING), map(float, np.median(times, axis=1)), strict=True))

@@ -102,7 +102,7 @@ def check_prepared(case):
     if prepared is None:
         assert type(case.method) in LITERATURE and len(reason) > 40
         return
-    assert prepared.setup.clock.frames == case.frames
+    assert case.frames <= prepared.setup.clock.frames <= 1.3 * case.frames, "a frame ends at each checkpoint"
     assert prepared.setup.clock.duration == pytest.approx(case.scene.duration, rel=1e-12)
 
 

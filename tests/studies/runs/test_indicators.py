@@ -20,17 +20,33 @@ from massspring import (
     simulate,
     tetrahedral_body,
 )
-from studies.runs.indicators import SWAYS, indicators, neighbours, remarks, still_from, sway, unlike_neighbours
+from studies.runs.indicators import (
+    FEEDS,
+    SHAKES,
+    SWAYS,
+    SWINGS,
+    gained,
+    indicators,
+    neighbours,
+    pace,
+    remarks,
+    still_from,
+    sway,
+    swing,
+    unlike_neighbours,
+)
 from studies.runs.run import measure
+from studies.runs.status import shaking
 from tests.massspring.conftest import SOFT, block
 from tests.massspring.quadratic import quadratic_block
 from tests.studies.tiny import SQUEEZE, tiny_case
 
-GOOD = {"unknowns_per_volume": 3.0, "alternation": 0.1, "sway": 1e-3, "volume_off": 9e-5}
+GOOD = {"unknowns_per_volume": 3.0, "alternation": 0.1, "sway": 1e-3, "volume_off": 9e-5, "gained": 1e-4, "swing": 1e-3, "pace": 1.0}
 
 
-def history(force, good_frames=50, pressure=None) -> History:
-    """Frames of which the last 25 come after the planes stand still, with a force [N] of the first plane."""
+def history(force=np.ones_like, good_frames=50, pressure=None, kinetic=0.0, work=1.0, gain=0.0) -> History:
+    """Frames of which the last 25 come after the planes stand still, with a force [N] of the first plane; kinetic
+    energy, work, and the energy that is not from work [J]."""
     t = np.linspace(0.0, 6.0, 51)[1:]
     contact = np.zeros((50, 2, 3))
     contact[:, 0, 2] = -force(t)
@@ -42,6 +58,10 @@ def history(force, good_frames=50, pressure=None) -> History:
         pressure=np.zeros((50, 1)) if pressure is None else pressure,
         volume=np.ones((50, 1)),
         volume_target=np.ones((50, 1)),
+        kinetic=kinetic * np.ones(50),
+        tissue_kinetic=0.25 * kinetic * np.ones(50),
+        work=work * np.ones(50),
+        elastic=(work - kinetic + gain) * np.ones(50),
     )
     return cast(History, made)
 
@@ -66,6 +86,49 @@ def test_frames_under_way_do_not_count():
     assert np.isnan(swaying(replace(SQUEEZE, quantities=("volume",)), history(np.ones_like)))
     late = Sphere((0, 0, 1.0), 0.1, Trajectory((0.0, 5.9), ((0, 0, 0), (0, 0, -0.1))))
     assert np.isnan(swaying(replace(SQUEEZE, obstacles=(late,)), history(np.ones_like)))
+
+
+RAMP = np.linspace(0.0, 1.0, 50)
+
+
+@pytest.mark.parametrize(
+    ("gain", "share"),
+    {
+        "balanced": (0.0, 0.0),
+        "damped": (-0.4 * RAMP, 0.0),
+        "fed": (0.2 * RAMP, 0.2 / 1.2),
+        "fed after much was lost": (np.where(RAMP > 0.5, 0.1, 0.0) - 0.5, 0.1),
+        "no frame": (np.nan * RAMP, np.nan),
+    }.values(),
+)
+def test_what_a_body_gains_is_what_it_has_more_than_it_was_given(gain, share):
+    assert gained(history(gain=gain)) == pytest.approx(share, abs=1e-12, nan_ok=True)
+
+
+def test_a_swing_is_the_motion_left_where_nothing_moves():
+    still = np.where(np.arange(50) < 25, 1.0, 1e-4)
+    assert swing(SQUEEZE, history(kinetic=still)) == pytest.approx(0.01)
+    assert np.isnan(swing(SQUEEZE, history(kinetic=still, good_frames=26)))
+
+
+def test_the_pace_is_that_of_the_masses_where_the_body_moves():
+    """A quarter of the kinetic energy with the tissue's masses: half as fast; nothing is said of slow loads."""
+    assert pace(history(kinetic=0.1)) == pytest.approx(0.5) and pace(history(kinetic=1e-5)) == 1.0
+
+
+@pytest.mark.parametrize(
+    ("fed", "swings", "status"),
+    [
+        (1.01 * SHAKES, 0.0, "shaken"),
+        (0.99 * SHAKES, 0.0, "ok"),
+        (1.01 * FEEDS, 1.01 * SWINGS, "shaken"),
+        (1.01 * FEEDS, 0.99 * SWINGS, "ok"),
+        (0.99 * FEEDS, 2.0 * SWINGS, "ok"),
+    ],
+)
+def test_a_run_that_gains_energy_is_shaken(fed, swings, status):
+    """The largest energy is 1 J, so that the gain [J] is its share."""
+    assert shaking(SQUEEZE, history(gain=fed * RAMP - fed, kinetic=swings**2))[0] == status
 
 
 def test_neighbours_share_an_element():

@@ -7,7 +7,7 @@ import pytest
 
 from massspring import Free, ImplicitVolume
 from studies.metrics.timing.skips import SKIPS
-from studies.metrics.timing.stage_cost import ENERGIES, FRAME, ROWS, SKIPPED, STAGE, cost_table, run_frames
+from studies.metrics.timing.stage_cost import FRAME, ROWS, SKIPPED, STAGE, cost_table, run_frames
 from studies.runs.prepare import prepare
 from studies.runs.recipes import QuadraticBody, SurfaceBody, TetrahedralBody
 from studies.scene.library.ball_clamped import BALL_CLAMPED
@@ -46,9 +46,9 @@ def test_what_is_left_out_is_named(squeezed):
     left_out = squeezed[squeezed["kind"] == SKIPPED]["what"].tolist()
     missing = ["thin probe: none", "gravity: none in this scene"]
     one = "linear solve: one volume is a division"
-    assert left_out == [*missing, "friction: no obstacle has any", one, ENERGIES]
+    assert left_out == [*missing, "friction: no obstacle has any", one]
     bare = cost_table(tiny_case(scene=BALL_CLAMPED, body=HELD, method=Free()), repeats=1)
-    assert bare[bare["kind"] == SKIPPED]["what"].tolist() == [NO_CONTACT, *missing, ENERGIES]
+    assert bare[bare["kind"] == SKIPPED]["what"].tolist() == [NO_CONTACT, *missing]
     assert "contact search" not in set(bare["what"])
     assert len(squeezed[squeezed["kind"] == FRAME]) == 2
 
