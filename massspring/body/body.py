@@ -155,6 +155,11 @@ class Body:
         return np.unique(self.triangles).astype(np.uint32)
 
     @property
+    def facets(self) -> np.ndarray:
+        """Facets of the surface, as curved as contact knows them, (f, 3) or (f, 6) uint32."""
+        return self.contact_facets if len(self.contact_facets) else self.triangles
+
+    @property
     def volume(self) -> float:
         """Rest volume V0 [m³]."""
         return float(enclosed_volume(self.rest, self.triangles))

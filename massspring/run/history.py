@@ -12,7 +12,8 @@ from massspring.layout.probe_arrays import tip_depth
 from massspring.layout.state import State
 from massspring.run.energy import EnergyAccount, elastic_energy, kinetic_energy
 from massspring.world.clock import Clock
-from massspring.world.obstacles import Obstacle, Probe
+from massspring.world.depth import deepest
+from massspring.world.obstacles import Obstacle, Plane, Probe
 
 ENERGIES = ("kinetic", "elastic", "tissue_kinetic", "work")
 
@@ -41,8 +42,11 @@ class History:
     contact_force: np.ndarray
     """Force of each obstacle on the body at the end of the frame [N], (F, o, 3)."""
     penetration: np.ndarray
-    """Penetration of the deepest surface node, or point inside a facet of a quadratic body, into each obstacle at the
-    end of the frame, for a thin probe of the surface [m], (F, o)."""
+    """Penetration of the deepest point of the surface into each obstacle at the end of the frame, into a plane of the
+    deepest node or contact point [m], (F, o)."""
+    inside: np.ndarray
+    """Whether the centre of a sphere or a point of a capsule's axis was inside the body at the end of the frame, or
+    passed through it in the frame, (F, o); never for planes and thin probes."""
     held_force: np.ndarray
     """Force of each attachment on the body at the end of the frame [N], (F, g, 3)."""
     min_j: np.ndarray
@@ -164,8 +168,8 @@ class Recorder:
         self.obstacles = obstacles
         # The impulses of thin probes come last.
         self.rank = sorted(range(len(obstacles)), key=lambda o: isinstance(obstacles[o], Probe))
-        self.surface_nodes = body.surface_nodes
-        self.facets = body.contact_facets, facet_rule()[0]
+        self.surface_nodes, self.facets = body.surface_nodes, body.facets
+        self.inside = np.zeros((frames, len(obstacles)), dtype=bool)
         self.contact_force = np.full((frames, len(obstacles), 3), np.nan)
         self.penetration = np.full((frames, len(obstacles)), np.nan)
         self.held_force = np.full((frames, attachments, 3), np.nan)
@@ -189,15 +193,7 @@ class Recorder:
         self.contact_force[frame, self.rank] = self._at_end(done.contact_impulse, done.earlier_contact, steps)
         self.held_force[frame] = self._at_end(done.held_impulse, done.earlier_held, steps)
         for o, obstacle in enumerate(self.obstacles):
-            t = float(self.t[frame])
-            if isinstance(obstacle, Probe):
-                depth = tip_depth(obstacle, x, self.body.triangles, t)
-            else:
-                facets, shape = self.facets
-                points = np.einsum("qa,fai->fqi", shape, x[facets]).reshape(-1, 3)
-                touched = np.concatenate([x[self.surface_nodes], points])
-                depth = -obstacle.gap(touched, t).min()
-            self.penetration[frame, o] = max(0.0, depth)
+            self.penetration[frame, o] = max(0.0, self._depth(frame, o, obstacle, x))
         self.steps[frame], self.frame_ns[frame] = steps, elapsed_ns
         self.singular += int(state.diagnostics.singular[0])
         self.limited += int(state.diagnostics.limited[0])
@@ -220,6 +216,19 @@ class Recorder:
         """Records the energies after a frame."""
         for name in ENERGIES:
             self.scalars[name][frame] = getattr(account, name)
+
+    def _depth(self, frame: int, o: int, obstacle: Obstacle, x: np.ndarray) -> float:
+        """Depth in obstacle number o at the end of a frame, with the body at `x` (n, 3) [m]; notes one that is
+        inside."""
+        t, triangles = float(self.t[frame]), self.body.triangles
+        if isinstance(obstacle, Probe):
+            return tip_depth(obstacle, x, triangles, t)
+        if isinstance(obstacle, Plane):
+            points = np.einsum("qa,fai->fqi", facet_rule()[0], x[self.body.contact_facets]).reshape(-1, 3)
+            return -float(obstacle.gap(np.concatenate([x[self.surface_nodes], points]), t).min())
+        depth, inside = deepest(obstacle, x, self.facets, triangles, t, (self.final, t - self.clock.frame))
+        self.inside[frame, o] = inside
+        return depth
 
     def record_targets(self, frame: int, targets: np.ndarray, numbers: Numbers | None) -> None:
         """Records the targets of the current volumes after a frame [m³]; parts of a volume that is not yet divided get
@@ -248,6 +257,7 @@ class Recorder:
             work=self.scalars["work"],
             contact_force=self.contact_force,
             penetration=self.penetration,
+            inside=self.inside,
             held_force=self.held_force,
             min_j=self.scalars["min_j"],
             snapshot_frames=np.array(frames, dtype=np.int64),

@@ -13,7 +13,8 @@ from massspring import Body
 from massspring.layout.face_pairs import faces_behind
 from massspring.layout.probe_arrays import tip_depth
 from massspring.sources import source_fingerprint
-from massspring.world.obstacles import Obstacle, Probe
+from massspring.world.depth import deepest
+from massspring.world.obstacles import Obstacle, Plane, Probe
 from studies.base.errors import StudyError
 from studies.exchange.entry import ENTRY, SECONDS, entry_name, entry_path, outside, run_of_entry
 from studies.exchange.fit import SAME, Fitting, fitted, force_at
@@ -25,7 +26,7 @@ from studies.reference.load import reference_for
 from studies.runs.case import Case
 from studies.runs.indicators import sway
 from studies.runs.prepare import LUMEN
-from studies.runs.status import folding
+from studies.runs.status import folding, tunnelling
 from studies.scene.scene import Scene
 from studies.store.record import Record, Status, new_fields, new_record, write_record
 from studies.store.schema import RUN_FIELDS
@@ -92,6 +93,8 @@ def entry_record(
     if "force" in fitting.histories:  # how much it varies at the end
         about["sway"] = sway(scene, values["t"], values["contact_force"], values["held_force"])
     status, message = folding(values["min_j"], shaped=scene.start is not None and scene.start.shaped)
+    slipped = tunnelling(values["inside"])
+    status, message = (Status.TUNNELLED, slipped) if slipped else (status, message)
     return _record(Case(scene, fitting.mesh.recipe, method), status, message, _attributes(fitting) | about, values)
 
 
@@ -135,7 +138,8 @@ def measured(fitting: Fitting) -> dict[str, np.ndarray]:
     scene, body, steps = mesh.scene, mesh.body, len(fitting.t)
     at = [int(np.argmin(np.abs(t - checkpoint))) for checkpoint in scene.checkpoints]
     names, moments = mesh.volumes.names, list(zip(x, t.tolist(), strict=True))
-    depth = [[_depth(obstacle, body, each, when) for obstacle in scene.obstacles] for each, when in moments]
+    depths = [[_depth(obstacle, body, each, when) for obstacle in scene.obstacles] for each, when in moments]
+    depth, inside = np.array(depths).reshape(steps, len(scene.obstacles), 2).transpose(2, 0, 1)
     pressure = np.zeros((steps, len(names)))
     for column, name in enumerate(names):
         pressure[:, column] = fitting.histories.get("lumen_pressure" if name == LUMEN else "pressure", 0.0)
@@ -145,7 +149,8 @@ def measured(fitting: Fitting) -> dict[str, np.ndarray]:
         "volume_target": mesh.volume_targets(t),
         "pressure": pressure,
         **_forces(scene, fitting.histories.get("force"), steps),
-        "penetration": np.array(depth).reshape(steps, len(scene.obstacles)),
+        "penetration": depth,
+        "inside": inside.astype(np.int64),
         "iterations": np.zeros((steps, 2), dtype=np.int64),
         "min_j": np.array([body.smallest_ratio(each) for each in x]),
         "snapshot_frame": np.array(at) + 1,
@@ -161,11 +166,15 @@ def measured(fitting: Fitting) -> dict[str, np.ndarray]:
     return fields
 
 
-def _depth(obstacle: Obstacle, body: Body, x: np.ndarray, t: float) -> float:
-    """How deep the deepest surface node lies in an obstacle [m]."""
+def _depth(obstacle: Obstacle, body: Body, x: np.ndarray, t: float) -> tuple[float, bool]:
+    """How deep the deepest point of the surface lies in an obstacle [m], in a plane the deepest node; and whether the
+    middle of a sphere or capsule is inside the body. What happens between steps is not seen."""
     if isinstance(obstacle, Probe):
-        return max(0.0, tip_depth(obstacle, x, body.triangles, t))
-    return max(0.0, -float(obstacle.gap(x[body.surface_nodes], t).min()))
+        return max(0.0, tip_depth(obstacle, x, body.triangles, t)), False
+    if isinstance(obstacle, Plane):
+        return max(0.0, -float(obstacle.gap(x[body.surface_nodes], t).min())), False
+    depth, inside = deepest(obstacle, x, body.facets, body.triangles, t)
+    return max(0.0, depth), inside
 
 
 def _forces(scene: Scene, force: np.ndarray | None, steps: int) -> dict[str, np.ndarray]:

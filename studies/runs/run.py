@@ -149,6 +149,7 @@ def _fields(case: Case, prepared: Prepared, history: History) -> dict[str, Field
         "pressure": history.pressure,
         "contact_force": history.contact_force,
         "penetration": history.penetration,
+        "inside": history.inside.astype(np.int64),
         "held_force": history.held_force,
         "iterations": history.iterations,
         "frame_steps": history.steps,

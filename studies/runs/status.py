@@ -23,6 +23,9 @@ def status_of(case: Case, history: History) -> tuple[Status, str]:
     if history.outcome != "finished":
         return Status(history.outcome), history.message
     start = case.scene.start
+    reason = tunnelling(history.inside)
+    if reason:
+        return Status.TUNNELLED, reason
     status, reason = folding(history.min_j, shaped=start is not None and start.shaped)
     if status != Status.OK:
         return status, reason
@@ -45,6 +48,19 @@ def shaking(scene: Scene, history: History) -> tuple[Status, str]:
         return Status.OK, ""
     words = f", and it swings by {100 * swings:.2g} % at the end" if swings > SWINGS else ""
     return Status.SHAKEN, f"the body gains {100 * fed:.2g} % of its energy by itself{words}; halve the step"
+
+
+def tunnelling(inside: np.ndarray) -> str:
+    """A sentence on the first obstacle with its middle inside the body in any frame (F, o); empty without one."""
+    frames, obstacles = np.nonzero(inside)
+    if not len(frames):
+        return ""
+    o = int(obstacles[0])
+    count = int(np.count_nonzero(inside[:, o]))
+    return (
+        f"the middle of obstacle {o} is or was inside the body in {count} of {len(inside)} "
+        "frames: it slipped through its surface; use more nodes there, or a quadratic body with graded='adaptive'"
+    )
 
 
 def folding(min_j: np.ndarray, shaped: bool) -> tuple[Status, str]:

@@ -32,6 +32,7 @@ class Status(StrEnum):
     FOLDED = "folded"  # J of an element is below 0.1 after a frame
     INVERTED = "inverted"  # J of an element is 0 or less after a frame
     SHAKEN = "shaken"  # the body gains energy that nothing gives it
+    TUNNELLED = "tunnelled"  # the middle of a sphere or capsule was inside the body
     DRIFTED = "drifted"  # a kept volume more than 1 % off
     NOT_CONVERGED = "not-converged"  # the reference found no equilibrium at a checkpoint
     BLOCKED = "blocked"  # a thin probe was driven through tissue that had nowhere to go
@@ -40,7 +41,7 @@ class Status(StrEnum):
     SKIPPED = "skipped"  # the method does not apply to the scene or the body; the message says why
 
 
-COMPARABLE = (Status.OK, Status.FOLDED, Status.INVERTED, Status.SHAKEN, Status.DRIFTED)
+COMPARABLE = (Status.OK, Status.TUNNELLED, Status.FOLDED, Status.INVERTED, Status.SHAKEN, Status.DRIFTED)
 """Statuses of runs that reach the last checkpoint: all their frames can be compared and timed."""
 WITHOUT_FIELDS = (Status.FAILED, Status.SKIPPED)
 """Nothing was computed: such a record has no fields, and no attributes but warnings."""
@@ -76,7 +77,8 @@ class RunFields(Table):
     volume_target = array("F m", NUMBER, "m^3", "what each kept volume should be")
     pressure = array("F m", NUMBER, "Pa", "multiplier of each kept volume in the last step of the frame")
     contact_force = array("F o 3", NUMBER, "N", "force of each obstacle on the body at the end of the frame")
-    penetration = array("F o", NUMBER, "m", "depth of the deepest surface node, or point in a facet, in each obstacle")
+    penetration = array("F o", NUMBER, "m", "depth of the deepest point of the surface in each obstacle")
+    inside = optional_array("F o", INDEX, "1", "1 where the middle of an obstacle was inside the body, else 0")
     held_force = array("F g 3", NUMBER, "N", "force of each held region on the body at the end of the frame")
     iterations = array("F 2", INDEX, "1", "for the multipliers: sum of the frame, most in a step")
     frame_steps = optional_array(

@@ -35,6 +35,7 @@ def kept_volumes(results: Path, studies: Sequence[Study]) -> pd.DataFrame:
                 Status.OK,
                 Status.FOLDED,
                 Status.INVERTED,
+                Status.TUNNELLED,
                 Status.DRIFTED,
             ):
                 continue

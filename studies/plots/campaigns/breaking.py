@@ -30,6 +30,7 @@ LOOKS = {
     "ok": (GREEN, ""),
     "folded": (MUTED[5], "oooo"),
     "inverted": (PURPLE, "////"),
+    "tunnelled": (MUTED[7], "++++"),
     "drifted": (YELLOW, "...."),
     "penetrated": (ORANGE, "xxxx"),
     "blocked": (SKY, "----"),

@@ -66,6 +66,7 @@ STATUS_LOOKS: dict[Status, tuple[str, str]] = {
     Status.OK: (GREEN, "o"),
     Status.FOLDED: (MUTED[5], "<"),
     Status.INVERTED: (PURPLE, "v"),
+    Status.TUNNELLED: (MUTED[7], ">"),
     Status.DRIFTED: (YELLOW, "D"),
     Status.DIVERGED: (BLACK, "X"),
     Status.NOT_CONVERGED: (ORANGE, "P"),

@@ -9,11 +9,12 @@ from dataclasses import asdict, dataclass
 import numpy as np
 import pandas as pd
 
-from massspring import History, MassSpringError, Probe, Setup, simulate
+from massspring import History, MassSpringError, Plane, Probe, Setup, simulate
 from studies.base.errors import StudyError
 from studies.base.processes import run_each
 from studies.geometry.mesh.organ_mesh import signed_volume
-from studies.runs.status import folding
+from studies.runs.status import folding, tunnelling
+from studies.store.schema import Status
 from studies.sweep.local import environment
 from studies.tools.fuzz.trial import Trial
 from studies.tools.fuzz.world import setup_of
@@ -61,7 +62,10 @@ def tried(trial: Trial) -> Outcome:
 
 
 def named(setup: Setup, history: History) -> tuple[str, str]:
-    """What a finished run is called, and why: ok, folded, inverted, drifted or penetrated."""
+    """What a finished run is called, and why: ok, tunnelled, folded, inverted, drifted or penetrated."""
+    reason = tunnelling(history.inside)
+    if reason:
+        return Status.TUNNELLED, reason
     status, reason = folding(history.min_j, shaped=setup.positions is not None)
     if reason:
         return status, reason
@@ -98,7 +102,9 @@ def broken(setup: Setup, history: History) -> str:
             continue
         deepest = max(0.0, -float(obstacle.gap(final[body.surface_nodes], end).min()))
         record = history.penetration[-1, number]
-        if abs(deepest - max(0.0, float(record))) > allowed:
+        # Between nodes a round obstacle may be deeper.
+        off = deepest - max(0.0, float(record))
+        if (abs(off) if isinstance(obstacle, Plane) else off) > allowed:
             return f"a node is {deepest:.3g} m inside obstacle {number}, the record says {record:.3g} m"
     return ""
 

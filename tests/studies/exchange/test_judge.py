@@ -3,11 +3,13 @@
 import shutil
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from massspring import Sphere
 from studies.exchange.description import judged_metrics
 from studies.exchange.entry import entries_beside, entry_files, run_of_entry
 from studies.exchange.judge import entry_record
@@ -87,6 +89,16 @@ def test_an_entry_on_the_curved_mesh_is_measured_there(ours, mesh_cache, tmp_pat
     assert run.volume_ratio == pytest.approx(0.9) and run.field("min_j") == pytest.approx(0.9)
     reach = 0.9 * np.array([mesh.points[:, 2].max(), -mesh.points[:, 2].min()])
     assert run.field("penetration")[1] == pytest.approx(reach - 0.05 * (1 - 0.3), rel=1e-6)
+
+
+@pytest.mark.parametrize(("height", "status"), [(0.0, Status.TUNNELLED), (0.07, Status.OK)])
+def test_an_entry_with_a_sphere_inside_says_so(ours, tmp_path, height, status):
+    """A sphere of 20 mm in the middle of the ball and above it, in positions that follow no force."""
+    scene = replace(SCENE, obstacles=(Sphere((0.0, 0.0, height), 0.02),))
+    record = entry_record(scene, ours.npz(tmp_path / "a.npz"), "theirs", NODES)
+    assert record.status == status
+    depth = record.fields["penetration"].values[0, 0]
+    assert depth == pytest.approx(0.02 + 0.05 if height == 0.0 else 0.0, abs=3e-3)
 
 
 @pytest.mark.parametrize(("height", "status"), [(0.05, Status.FOLDED), (-1.0, Status.INVERTED)])

@@ -298,3 +298,14 @@ def test_attachments_that_overlap_or_miss_fail_in_one_sentence(tmp_path):
     assert measure(tiny_case(scene=file_scene(path, held=(top,)), body=body)).status == Status.OK
     assert "same node" in failure(tiny_case(scene=file_scene(path, held=(top, replace(top, name="again"))), body=body))
     assert "holds no node" in failure(tiny_case(scene=file_scene(path, held=(far,)), body=body))
+
+
+@pytest.mark.parametrize("frame", [0, 2, FRAMES - 1])
+def test_an_obstacle_that_was_inside_in_any_frame_tunnelled(ended, frame):
+    """Before all else: what folds then is a sequel."""
+    case, _, history = ended
+    inside = np.zeros((FRAMES, 2), dtype=bool)
+    inside[frame, 1] = True
+    verdict, message = status_of(case, replace(history, inside=inside, min_j=-np.ones(FRAMES)))
+    assert verdict == Status.TUNNELLED and f"obstacle 1 is or was inside the body in 1 of {FRAMES} frames" in message
+    assert status_of(case, replace(history, inside=inside & False))[0] == Status.OK

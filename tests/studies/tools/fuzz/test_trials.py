@@ -99,6 +99,7 @@ def test_each_truth_is_missed_by_what_breaks_it(pressed):
     assert "inside obstacle 0" in str(broken(setup, deep))
     upright = {"min_j": np.abs(history.min_j)}
     assert named(setup, replace(deep, **upright))[0] == "penetrated"
+    assert named(setup, replace(history, inside=~history.inside))[0] == "tunnelled"
     assert named(setup, replace(history, volume=1.1 * history.volume, **upright))[0] == "drifted"
     folded = np.append(0.05, upright["min_j"][1:])
     assert named(setup, replace(history, min_j=folded))[0] == "folded"
