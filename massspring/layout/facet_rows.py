@@ -3,6 +3,7 @@
 import numpy as np
 
 from massspring.kernels.points.arrays import FacetRows
+from massspring.kernels.points.facets import FURTHER
 
 CORNER = np.array([[0, 1, 3], [1, 2, 4], [2, 0, 5]])
 """Both ends and the middle of each side of a facet."""
@@ -28,15 +29,21 @@ def facet_rule() -> tuple[np.ndarray, np.ndarray]:
 def facet_rows(facets: np.ndarray, rest: np.ndarray, inverse_mass: np.ndarray) -> FacetRows:
     """The arrays for those of the facets (f, 6) that have a free node."""
     node = facets[(inverse_mass[facets] > 0.0).any(axis=1)]
-    shape, weight = facet_rule()
-    x = rest[node]
+    fixed, weight = facet_rule()
+    x, number = rest[node], len(weight)
     reach = MARGIN * np.linalg.norm(x - x[:, :3].mean(axis=1, keepdims=True), axis=2).max(axis=1, initial=0.0)
-    points = (len(node), len(weight))
-    coupling = np.einsum("fa,qa,pa->fqp", inverse_mass[node], shape, shape)
+    sides = np.linalg.norm(x[:, :3] - np.roll(x[:, :3], 1, axis=1), axis=2)
+    points = (len(node), number + FURTHER)
+    shape, mass, coupling = np.zeros((*points, 6)), np.ones(points), np.zeros((*points, points[1]))
+    shape[:, :number] = fixed
+    coupling[:, :number, :number] = np.einsum("fa,qa,pa->fqp", inverse_mass[node], fixed, fixed)
+    mass[:, :number] = 1.0 / np.einsum("fqq->fq", coupling[:, :number, :number])
     return FacetRows(
         node=np.ascontiguousarray(node, dtype=np.uint32),
+        count=np.full(len(node), number),
+        half_side=0.5 * sides.max(axis=1, initial=0.0),
         shape=shape,
-        mass=1.0 / np.einsum("fqq->fq", coupling),
+        mass=mass,
         reach=reach,
         near=np.zeros(len(node), dtype=np.uint32),
         contact_id=np.zeros(points, dtype=np.int64),
@@ -49,5 +56,5 @@ def facet_rows(facets: np.ndarray, rest: np.ndarray, inverse_mass: np.ndarray) -
         gap=np.zeros(points),
         pressed=np.zeros(len(node), dtype=bool),
         **{name: np.zeros((*points, 3)) for name in ("slope", "start", "last_force")},
-        **{name: np.zeros((len(weight), 3)) for name in ("point_speed", "change")},
+        **{name: np.zeros((points[1], 3)) for name in ("point_speed", "change")},
     )

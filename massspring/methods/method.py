@@ -16,7 +16,7 @@ from massspring.layout.state import State, new_diagnostics
 from massspring.methods.capabilities import Capabilities
 from massspring.world.obstacles import Attachment, Surroundings
 
-REMEMBERED = ("contact_id", "pressing", "normal", "dragging", "anchor")
+REMEMBERED = ("contact_id", "pressing", "normal", "dragging", "anchor", "count", "shape")
 """What contact inside facets keeps from step to step."""
 
 

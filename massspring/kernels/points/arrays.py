@@ -19,12 +19,16 @@ SUMS = ROWS + AREAS
 
 @by_address
 class FacetRows(NamedTuple):
-    """p points in each of f facets, and the state of their contact."""
+    """Up to p points in each of f facets, all but the last FURTHER fixed, and the state of their contact."""
 
     node: np.ndarray
     """Corners, then mid-sides, (f, 6) uint32."""
+    count: np.ndarray
+    """Points in use, the first ones of p, (f,) int64."""
+    half_side: np.ndarray
+    """Half the longest side at rest, from corner to corner [m], (f,)."""
     shape: np.ndarray
-    """Shape functions at the points, (p, 6)."""
+    """Shape functions at the points, (f, p, 6)."""
     mass: np.ndarray
     """Effective mass of a point, 1/Σ_a w_a N_a² [kg], (f, p)."""
     reach: np.ndarray

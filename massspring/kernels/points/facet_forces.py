@@ -74,7 +74,7 @@ def press(facets, boundary, step, f, q):
 def settle_points(facets, boundary, step, f):
     """Applies `press` to the points of facet f in turn; their changes of force go into `change` (p, 3) [N]. Returns the
     largest change and the largest force [N]."""
-    dt, u, points = boundary.dt, facets.point_speed, facets.shape.shape[0]
+    dt, u, points = boundary.dt, facets.point_speed, facets.count[f]
     changed, largest = 0.0, 0.0
     for q in range(points):
         if facets.candidate[f, q] == 0:
@@ -96,8 +96,8 @@ def settle_points(facets, boundary, step, f):
 @njit_inlined
 def open_facet(facets, speed, f):
     """Sets `point_speed` of the points of facet f [m/s], and their changes to 0."""
-    for q in range(facets.shape.shape[0]):
-        put(facets.point_speed, q, at_point(speed, facets.node, facets.shape[q], f))
+    for q in range(facets.count[f]):
+        put(facets.point_speed, q, at_point(speed, facets.node, facets.shape[f, q], f))
         put(facets.change, q, (0.0, 0.0, 0.0))
 
 
@@ -106,8 +106,8 @@ def tell_nodes(facets, speed, inverse_mass, dt, f):
     """Adds the effect of the changes of force on facet f to the velocities `speed` of its nodes [m/s]."""
     for a in range(6):
         i, d = facets.node[f, a], (0.0, 0.0, 0.0)
-        for q in range(facets.shape.shape[0]):
-            d = plus(d, times(facets.shape[q, a], row(facets.change, q)))
+        for q in range(facets.count[f]):
+            d = plus(d, times(facets.shape[f, q, a], row(facets.change, q)))
         add_to(speed, i, times(dt * inverse_mass[i], d))
 
 
@@ -117,7 +117,7 @@ def give_back(facets, speed, inverse_mass, dt, count):
     obstacle."""
     for k in range(count):
         f = facets.near[k]
-        for q in range(facets.shape.shape[0]):
+        for q in range(facets.count[f]):
             put(facets.change, q, minus(force_at(facets, f, q), row(facets.last_force[f], q)))
         tell_nodes(facets, speed, inverse_mass, dt, f)
 
@@ -130,7 +130,7 @@ def book(facets, boundary, step, speed, contact_impulse, f, q):
     if force[0] == 0.0 and force[1] == 0.0 and force[2] == 0.0:
         forget(facets, f, q)
     elif slides(facets, boundary, o, f, q):
-        end = plus(row(facets.start[f], q), times(dt, at_point(speed, facets.node, facets.shape[q], f)))
+        end = plus(row(facets.start[f], q), times(dt, at_point(speed, facets.node, facets.shape[f, q], f)))
         put(facets.anchor[f], q, minus(end, row(boundary.position[step], o)))
 
 
@@ -188,7 +188,7 @@ def changes_into(facets, field, count):
     field[:] = 0.0
     for k in range(count):
         f = facets.near[k]
-        for q in range(facets.shape.shape[0]):
+        for q in range(facets.count[f]):
             change = minus(force_at(facets, f, q), row(facets.last_force[f], q))
             add_at_point(facets, field, change, f, q)
 
@@ -199,6 +199,6 @@ def book_points(facets, boundary, step, speed, contact_impulse, count):
     of points that slide; `speed` (n, 4): velocities at the end of the step [m/s]."""
     for k in range(count):
         f = facets.near[k]
-        for q in range(facets.shape.shape[0]):
+        for q in range(facets.count[f]):
             if facets.contact_id[f, q] > 0:
                 book(facets, boundary, step, speed, contact_impulse, f, q)

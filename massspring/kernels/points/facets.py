@@ -3,17 +3,31 @@ force.
 
 A uniform pressure on a quadratic facet gives no force at its corners, so contact at nodes alone is uneven. Here forces
 act at points inside the facet (theory, eq. 9.3–9.5); `facet_forces` computes them.
+A facet that is long against a round obstacle gets further points where this is deepest: between the fixed ones it would
+slip through.
 """
 
 import math
 
 from massspring.kernels.contact.gaps import gap_and_normal
+from massspring.kernels.contact.nearest import box_square, nearest_of_facet, shape_at
 from massspring.kernels.jit.decorators import njit_inlined, njit_lean
 from massspring.kernels.jit.vec3 import add_to, dot, minus, over, plus, put, row, times
 
 LEFT = 0.95
 """Share of a penetration or slip at the start of a step that may remain at its end. Pressures respond one step later,
 so a full correction at once would shake the body (eq. 9.7)."""
+
+
+FURTHER = 4
+"""Most further points of a facet."""
+THIN = 1.0
+"""Radius of an obstacle over half the longest side of a facet below which the facet gets further points: at 1 a sphere
+sinks in between its fixed ones by up to 3 % of its radius."""
+DEEPER = 0.2
+"""Of the radius: how much deeper than all that touch an obstacle a further point must be."""
+LOOSE = 0.1
+"""Least mobility of a further point over the largest of the others: next to what is held nothing can answer a force."""
 
 
 @njit_inlined
@@ -87,7 +101,91 @@ def begin_touch(facets, boundary, step, y, o, place):
 def add_at_point(facets, field, force, f, q):
     """Distributes a force (3,) [N] at point q of facet f to its nodes, into `field` (n, 3)."""
     for a in range(6):
-        add_to(field, facets.node[f, a], times(facets.shape[q, a], force))
+        add_to(field, facets.node[f, a], times(facets.shape[f, q, a], force))
+
+
+@njit_inlined
+def depth_at(facets, nodes, boundary, o, centre, f, q):
+    """How deep point q of facet f lies in obstacle o with its anchor at `centre` [m]."""
+    y = at_point(nodes.x, facets.node, facets.shape[f, q], f)
+    return -gap_and_normal(boundary, o, minus(y, centre))[0]
+
+
+@njit_inlined
+def bare_point(facets, nodes, boundary, step, f):
+    """Whether a facet needs one more point, and the barycentric coordinates of its place: where an obstacle that is
+    thin against the facet, and within its reach, is deepest, unless it is hardly deeper than at a point that touches
+    it."""
+    place, deepest_yet, found, at = boundary.position[step], -facets.reach[f], False, (0.0, 0.0, 0.0)
+    for o in range(boundary.radius.shape[0]):
+        radius, centre, span = boundary.radius[o], row(place, o), row(boundary.span, o)
+        if not boundary.inside[o] or boundary.is_plane[o] or not radius < THIN * facets.half_side[f]:
+            continue
+        if not box_square(nodes.x, facets.node, f, centre, span) < (radius - deepest_yet) ** 2:
+            continue
+        square, b = nearest_of_facet(nodes.x, facets.node, f, centre, span)
+        depth, held = radius - math.sqrt(square), -math.inf
+        for q in range(facets.count[f]):
+            if facets.contact_id[f, q] == o + 1:
+                held = max(held, depth_at(facets, nodes, boundary, o, centre, f, q))
+        if depth > deepest_yet and depth > held + DEEPER * radius:
+            deepest_yet, found, at = depth, True, b
+    return found, at
+
+
+@njit_inlined
+def drop_idle(facets, f):
+    """Forgets further points of facet f that touch nothing."""
+    fixed, q = facets.shape.shape[1] - FURTHER, facets.count[f] - 1
+    while q >= fixed:
+        if facets.contact_id[f, q] == 0:
+            last = facets.count[f] - 1
+            facets.contact_id[f, q], facets.pressing[f, q] = facets.contact_id[f, last], facets.pressing[f, last]
+            put(facets.normal[f], q, row(facets.normal[f], last))
+            put(facets.dragging[f], q, row(facets.dragging[f], last))
+            put(facets.anchor[f], q, row(facets.anchor[f], last))
+            for a in range(6):
+                facets.shape[f, q, a] = facets.shape[f, last, a]
+            forget(facets, f, last)
+            facets.count[f] = last
+        q -= 1
+
+
+@njit_inlined
+def couple(facets, inverse_mass, f, q):
+    """Sets what forces at point q of facet f and at the points before it do to each other. Returns whether point q can
+    move."""
+    most = 0.0
+    for p in range(q + 1):
+        shared = 0.0
+        for a in range(6):
+            shared += facets.shape[f, q, a] * facets.shape[f, p, a] * inverse_mass[facets.node[f, a]]
+        facets.coupling[f, q, p] = facets.coupling[f, p, q] = shared
+        if p < q:
+            most = max(most, facets.coupling[f, p, p])
+    facets.mass[f, q] = 1.0 / facets.coupling[f, q, q]
+    return facets.coupling[f, q, q] > LOOSE * most
+
+
+@njit_lean
+def place_further_points(nodes, facets, boundary, step, inverse_mass):
+    """Gives facets further points where obstacles thin against them are deeper than at all that touch them. Such a
+    point stays where it is while it touches. Facets without any keep their fixed points alone."""
+    fixed = facets.shape.shape[1] - FURTHER
+    for f in range(facets.node.shape[0]):
+        if facets.count[f] > fixed:
+            drop_idle(facets, f)
+            for q in range(fixed, facets.count[f]):
+                couple(facets, inverse_mass, f, q)
+        if facets.count[f] == facets.shape.shape[1]:
+            continue
+        found, b = bare_point(facets, nodes, boundary, step, f)
+        if found:
+            q, weights = facets.count[f], shape_at(b)
+            for a in range(6):
+                facets.shape[f, q, a] = weights[a]
+            if couple(facets, inverse_mass, f, q):
+                facets.count[f] = q + 1
 
 
 @njit_lean
@@ -96,9 +194,9 @@ def last_forces_into(nodes, facets, boundary, step, field):
     (n, 3)."""
     field[:] = 0.0
     for f in range(facets.node.shape[0]):
-        for q in range(facets.shape.shape[0]):
+        for q in range(facets.count[f]):
             if facets.contact_id[f, q] > 0:
-                y = at_point(nodes.x, facets.node, facets.shape[q], f)
+                y = at_point(nodes.x, facets.node, facets.shape[f, q], f)
                 face(facets, boundary, step, y, facets.contact_id[f, q] - 1, (f, q))
                 add_at_point(facets, field, force_at(facets, f, q), f, q)
 
@@ -135,14 +233,15 @@ def list_near(facets, nodes, boundary, step, speed):
     number, and the last facet that lost a contact, or −1."""
     count, lost = 0, -1
     for f in range(facets.node.shape[0]):
-        near = not is_far(facets, nodes, boundary, step, f)
-        for q in range(facets.shape.shape[0]):
+        # A thin obstacle stretches a facet beyond its reach.
+        near = facets.count[f] > facets.shape.shape[1] - FURTHER or not is_far(facets, nodes, boundary, step, f)
+        for q in range(facets.count[f]):
             near |= facets.contact_id[f, q] > 0
         if near:
             facets.near[count] = f
             count += 1
-            for q in range(facets.shape.shape[0]):
-                weights = facets.shape[q]
+            for q in range(facets.count[f]):
+                weights = facets.shape[f, q]
                 state = at_point(nodes.x, facets.node, weights, f), at_point(speed, facets.node, weights, f)
                 if prepare_point(facets, boundary, step, state, f, q):
                     lost = f

@@ -13,7 +13,7 @@ from massspring.kernels.jit.decorators import njit_inlined, njit_lean
 from massspring.kernels.jit.stage_clock import HELD, INTEGRATION, SEARCH, SPRINGS, VOLUME, end_stage
 from massspring.kernels.points.elements import ease_into, measure_into, push_into
 from massspring.kernels.points.facet_forces import book_points, corrections_into
-from massspring.kernels.points.facets import last_forces_into
+from massspring.kernels.points.facets import last_forces_into, place_further_points
 from massspring.kernels.points.solve import (
     add_response,
     pushed_velocity_into,
@@ -84,6 +84,7 @@ def meet_points(frame, step, push, rows, implicit):
     (eq. 9.3–9.5). Returns the most passes of the active set, and how many facets are near an obstacle."""
     boundary, inside = frame.boundary, any_touches(frame.boundary, True)
     if inside:
+        place_further_points(frame.nodes, rows.facets, boundary, step, frame.model.inverse_mass)
         last_forces_into(frame.nodes, rows.facets, boundary, step, rows.field)
         add_response(frame.model, frame.nodes, rows, implicit, boundary.dt)
     passes = search_contacts(frame, step, push) if any_touches(boundary, False) else 1

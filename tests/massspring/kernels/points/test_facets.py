@@ -1,5 +1,6 @@
 """Contact at points inside quadratic facets, smooth and rough."""
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -21,7 +22,7 @@ from massspring import (
 )
 from massspring.layout.facet_rows import facet_rule
 from tests.massspring.conftest import SOFT
-from tests.massspring.quadratic import RADIUS, ball_mesh, quadratic_block
+from tests.massspring.quadratic import RADIUS, ball_mesh, bricks, quadratic_block
 
 DEPTH = 0.15 * RADIUS
 """What each plane travels."""
@@ -202,3 +203,54 @@ def test_a_round_obstacle_presses_a_held_ball(shape, friction):
     assert push[2] < -0.05 and np.abs(push + hold).max() < 2e-3 * abs(push[2])
     assert obstacle.gap(places(ball(), history.final), HELD).min() > -INSIDE * RADIUS
     assert np.abs(history.volume / ball().rest_volumes - 1.0).max() < 1e-5
+
+
+THIN = 0.003
+"""Radius of a tool that meets no fixed point of a facet of 20 mm [m]."""
+
+
+@cache
+def pricked(radius: float, friction: float = 0.0, x: float = 0.012):
+    """A block of 40 mm, held below, with a sphere that presses 4 mm into the middle of a facet of its top, by `x` = .02
+    into the corner between some."""
+    body = quadratic_body(*bricks((2, 2, 2), (EDGE, EDGE, EDGE)), SOFT)
+    way = Trajectory((0.0, 2.0), ((0.0, 0.0, 0.0), (0.0, 0.0, -0.004)))
+    tool = Sphere((x, 0.007 if x < 0.02 else x, EDGE + radius), radius, way, friction)
+    held = Attachment(np.flatnonzero(body.rest[:, 2] < 1e-9))
+    clock = clock_of(body, 0.5, 2.5, 100, held.nodes)
+    setup = Setup(body, ImplicitVolume(), clock, (tool,), (held,), damping=20.0)
+    return tool, setup, simulate(setup)
+
+
+@pytest.mark.parametrize("x", [0.012, 0.02])
+def test_a_tool_thinner_than_a_facet_presses_it(x):
+    """Its force is that on what is held, its work what the springs and the pressures inside elements store."""
+    tool, _, history = pricked(THIN, x=x)
+    assert history.outcome == "finished" and not history.inside.any()
+    force = history.contact_force[:, 0, 2]
+    assert np.abs(history.contact_force[-1, 0] + history.held_force[-1, 0]).max() < 1e-3 * np.abs(force[-1])
+    assert history.penetration.max() < 0.1 * THIN
+    work = -force @ np.diff(tool.path(np.r_[0.0, history.t])[:, 2]) * -1.0
+    assert work == pytest.approx(history.elastic[-1], rel=0.05) and work > 1e-5
+    assert (force[10:80] < 0.0).all()  # down, from the first touch on
+
+
+def test_friction_holds_a_thin_tool_too():
+    """A sideways pull below the limit moves the body along, one beyond it slides at Coulomb's force."""
+    tool, setup, _ = pricked(THIN, 0.3)
+    times, deep = (0.0, 1.0, 2.0), -0.003
+    way = Trajectory(times, ((0.0, 0.0, 0.0), (0.0, 0.0, deep), (0.004, 0.0, deep)))
+    history = simulate(replace(setup, obstacles=(replace(tool, path=way),)))
+    normal, drag = history.contact_force[:, 0, 2], history.contact_force[:, 0, 0]
+    share = np.abs(drag / normal)[45:]
+    assert (share < 0.9).all() and drag[-1] > 0.05 * abs(normal[-1]) and not history.inside.any()
+
+
+def test_a_thick_sphere_touches_the_fixed_points_alone():
+    """To the bit what it did: no facet gets a further point."""
+    _, setup, history = pricked(0.03)
+    state = setup.start()
+    for frame in range(30):
+        state = setup.method.advance(state, setup.boundary(frame))
+    assert (state.rows.facets.contact_id > 0).any() and np.ptp(state.rows.facets.count) == 0
+    assert history.contact_force[-1, 0, 2] < 0.0
