@@ -6,11 +6,12 @@ from collections.abc import Callable
 import numpy as np
 
 from massspring import Capsule, Sphere
+from massspring.world.depth import facets_within
 from studies.base.errors import StudyError
 from studies.geometry import OrganMesh
 from studies.geometry.mesh.organ_mesh import triangle_areas
 from studies.geometry.surface.sides import along_facets, region_area
-from studies.meshing.bounds import FACETS, HELD_AREA, REFUSED_AREA
+from studies.meshing.bounds import FACETS, FEW, HELD_AREA, REFUSED_AREA, SIDE
 from studies.meshing.quadratic_mesh import QuadraticMesh
 from studies.meshing.rest_surface import OUTER, rest_surfaces
 from studies.meshing.scene_mesh import patch_nodes
@@ -22,13 +23,15 @@ from studies.scene.scene import Held, Organ, Scene
 TOUCHED = 0.6
 """Facets that touch a probe at the end over those whose rest position is inside its final position: 0.5 to 0.8 for 40
 pressed livers and stomachs; in Hertz's contact half of the area."""
+MOMENTS = 400
+"""Most moments looked at between two keys of a path."""
 FINER = 1.08
 """Ratio of the numbers of vertices of successive meshes in the search for one that keeps the area of all held regions:
 one mesh may cut off a held end of the organ, and the next finer one not."""
 
 
 def tell_shape(scene: Scene, mesh: OrganMesh | QuadraticMesh, filled: bool) -> None:
-    """Warns, in one sentence, of a body beyond the bounds of studies.meshing.bounds. filled: whether the body is the
+    """Warns, in a sentence each, of a body beyond the bounds of studies.meshing.bounds. filled: whether the body is the
     tissue. Raises StudyError if the area of a held region deviates by more than REFUSED_AREA."""
     faults = []
     # Triangles of a file that is used unchanged have its exact shape.
@@ -53,24 +56,83 @@ def tell_shape(scene: Scene, mesh: OrganMesh | QuadraticMesh, filled: bool) -> N
     few = touched_facets(scene, mesh)
     if scene.held and few is not None and few < FACETS:
         warnings.warn(
-            f"{mesh.name}: only about {few:.0f} facets will touch the probe; below {FACETS} its force may be several "
-            "percent off, to either side; use more nodes, or a quadratic body with graded='adaptive'",
+            f"{mesh.name}: only about {max(few, 1.0):.0f} facets will touch the probe; below {FACETS} its force may be "
+            f"several percent off, below {FEW} tens of percent, to either side; use more nodes, or a quadratic body "
+            "with graded='adaptive'",
             stacklevel=2,
         )
 
 
+def check_reach(scene: Scene, mesh: OrganMesh | QuadraticMesh, at_nodes: bool) -> None:
+    """Refuses a body that a moving sphere or capsule is too thin for, by the facets at rest that it comes to: one
+    touched `at_nodes` alone if it reaches no node, so that it slips through; one touched inside facets if most of these
+    have a side of more than SIDE radii. Raises StudyError. Not where what is held moves."""
+    if any(top_speed(held.path) > 0 for held in scene.held):
+        return
+    outer = outer_facets(mesh)
+    corners = mesh.points[outer[:, :3]]
+    sides = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
+    for number, probe in _probes(scene):
+        times = moments_of(probe)
+        met = np.any([facets_within(probe, mesh.points, outer, t) for t in times], axis=0)
+        if not met.any():
+            continue
+        long = float(np.median(sides[met])) / probe.radius
+        nodes = mesh.points[np.unique(outer)]
+        if at_nodes and not any(probe.gap(nodes, t).min() < 0.0 for t in times):
+            why = "passes between the nodes, at which alone obstacles touch this body"
+        elif not at_nodes and long > SIDE:
+            why = f"is too thin for the facets under it, whose sides are {long:.2g} times as long (allowed: {SIDE:g})"
+        else:
+            continue
+        raise StudyError(
+            f"{mesh.name}: obstacle {number}, of radius {1e3 * probe.radius:.3g} mm, {why}; use more nodes, or a "
+            "quadratic body with graded='adaptive'"
+        )
+
+
+def _probes(scene: Scene) -> list[tuple[int, Sphere | Capsule]]:
+    """The moving spheres and capsules with their numbers."""
+    return [
+        (number, one)
+        for number, one in enumerate(scene.obstacles)
+        if isinstance(one, Sphere | Capsule) and top_speed(one.path) > 0
+    ]
+
+
+def moments_of(probe: Sphere | Capsule) -> list[float]:
+    """Times [s] between which an obstacle moves by at most half its radius: all where it stops or turns, and more."""
+    times = np.array(probe.path.times)
+    ways = np.linalg.norm(np.diff(probe.path(times), axis=0), axis=1)
+    parts = np.ceil(2.0 * ways / probe.radius).astype(int).clip(1, MOMENTS)
+    between = [np.linspace(times[k], times[k + 1], int(n), endpoint=False) for k, n in enumerate(parts)]
+    return np.concatenate([*between, times[-1:]]).tolist()
+
+
+def outer_facets(mesh: OrganMesh | QuadraticMesh) -> np.ndarray:
+    """Facets of the outer surface, (f, 3 or 6)."""
+    if isinstance(mesh, QuadraticMesh):
+        return mesh.facets[: len(mesh.facets) - len(mesh.lumen)]
+    return mesh.outer_triangles
+
+
 def touched_facets(scene: Scene, mesh: OrganMesh | QuadraticMesh) -> float | None:
-    """Estimated number of outer facets that a moving sphere or capsule touches at the last checkpoint, the smallest
-    over all of them; None without one."""
-    probes = [one for one in scene.obstacles if isinstance(one, Sphere | Capsule) and top_speed(one.path) > 0]
+    """Estimated number of outer facets that a moving sphere or capsule touches where it touches most, the smallest over
+    all of them; None without one."""
+    probes = _probes(scene)
     if not probes or not scene.checkpoints:
         return None
-    outer = (
-        mesh.facets[: len(mesh.facets) - len(mesh.lumen)] if isinstance(mesh, QuadraticMesh) else mesh.outer_triangles
-    )
+    outer = outer_facets(mesh)
     places, _ = along_facets(mesh.points, outer)
-    inside = [probe.gap(places, scene.checkpoints[-1]).reshape(len(outer), -1) < 0.0 for probe in probes]
-    return TOUCHED * min(int(one.any(axis=1).sum()) for one in inside)
+    most = [
+        max(
+            int((probe.gap(places, t).reshape(len(outer), -1) < 0.0).any(axis=1).sum())
+            for t in (*moments_of(probe), scene.checkpoints[-1])
+            if t <= scene.checkpoints[-1]
+        )
+        for _, probe in probes
+    ]
+    return TOUCHED * min(most)
 
 
 def held_area_error(scene: Scene, mesh: OrganMesh | QuadraticMesh, held: Held) -> float:

@@ -2,6 +2,8 @@
 
 import math
 
+from studies.meshing.bounds import FEW
+
 MISSING = "–"
 UNRESOLVED_MARK = "†"
 """Mark of an error that is less than ten times the uncertainty of the reference."""
@@ -12,6 +14,8 @@ UNCONVERGED_NOTE = (
     f"{UNCONVERGED_MARK} not converged: the answer depends on the step and on the order of elements, which ± does not "
     "contain"
 )
+FEW_MARK = "‡"
+FEW_NOTE = f"{FEW_MARK} a sphere or capsule touches fewer than {FEW} facets: its force may be off by tens of percent"
 MINUS = "−"
 
 

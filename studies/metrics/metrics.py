@@ -5,9 +5,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from massspring import Capsule, Sphere
+from massspring.world.depth import facets_within
 from studies.geometry.mesh.organ_mesh import tetrahedron_volumes
 from studies.geometry.surface.distance import hausdorff
 from studies.geometry.surface.sides import along_facets
+from studies.meshing.bounds import FEW
 from studies.meshing.rest_surface import OUTER
 from studies.metrics import cutting
 from studies.metrics.metric import PERCENT, Metric
@@ -136,7 +139,8 @@ def rest_distance(run: Run) -> float:
 
 
 def penetration(run: Run) -> float:
-    """100 × the deepest any node lies inside an obstacle after a frame, over the body's size [%]; NaN without one."""
+    """100 × the deepest any point of the surface lies inside an obstacle after a frame, over the body's size [%]; NaN
+    without one."""
     depth = run.fields.penetration
     return (
         PERCENT * float(depth.max()) / float(np.linalg.norm(np.ptp(run.fields.rest, axis=0))) if depth.size else np.nan
@@ -209,6 +213,17 @@ def contact_facets(run: Run) -> float:
     places, _ = along_facets(run.fields.snapshots[-1], facets)
     gap = scene.obstacles[scene.probed.number].gap(places, scene.checkpoints[-1])
     return float((gap.reshape(len(facets), -1) < TOUCH * run.size).any(axis=1).sum())
+
+
+def few_facets(run: Run) -> bool:
+    """Whether a sphere or capsule touches at least one and fewer than FEW outer facets at the last checkpoint: its
+    nearest point of each within 0.1 % of the size."""
+    sides, scene = run.sides, run.case.scene
+    if sides is None or not len(run.fields.snapshots):
+        return False
+    x, facets, t = run.fields.snapshots[-1], sides[OUTER].facets, scene.checkpoints[-1]
+    rounds = [one for one in scene.obstacles if isinstance(one, Sphere | Capsule)]
+    return any(0 < facets_within(one, x, facets, t, TOUCH * run.size).sum() < FEW for one in rounds)
 
 
 def contact_turn(run: Run) -> float:

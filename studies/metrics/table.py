@@ -11,7 +11,7 @@ from studies.base.errors import StudyError
 from studies.base.lookup import lookup
 from studies.metrics.cells import UNCONVERGED_MARK
 from studies.metrics.metric import Metric
-from studies.metrics.metrics import METRICS
+from studies.metrics.metrics import METRICS, few_facets
 from studies.metrics.run import Run
 from studies.reference.uncertainty import QUANTITIES
 from studies.runs.recipe_text import recipe_text
@@ -24,6 +24,8 @@ UNCONVERGED = "not converged"
 """Column with the reason why the answer of the method depends on the step and on the order of elements."""
 UNRESOLVED = "doubtful"
 """Column with the metrics whose value is less than ten times the uncertainty of the reference."""
+FEW_FACETS = "few facets"
+"""Column that says whether a sphere or capsule touches fewer than eight facets."""
 
 
 def metric(name: str | Metric) -> Metric:
@@ -55,8 +57,10 @@ def study_table(runs: Sequence[Run], columns: Sequence[str | Metric]) -> pd.Data
 
 
 def frame_of(rows: Sequence[Row]) -> pd.DataFrame:
-    """Rows as a table, without empty "… floor" columns."""
+    """Rows as a table, without empty "… floor" columns, and with FEW_FACETS only if it is true of one."""
     frame = pd.DataFrame(rows)
+    if FEW_FACETS in frame and not any(row[FEW_FACETS] for row in rows):
+        frame = frame.drop(columns=FEW_FACETS)
     unknown = [name for name in frame.columns if " floor [" in name and frame[name].isna().to_numpy().all()]
     return frame.drop(columns=unknown)
 
@@ -88,5 +92,6 @@ def row_of(run: Run, metrics: Sequence[Metric]) -> Row:
     for entry in metrics:
         row[f"{entry.name} [{entry.unit}]"] = entry(run)
         row[f"{entry.name} floor [{entry.unit}]"] = entry.uncertainty(run)
+    row[FEW_FACETS] = few_facets(run)
     row[UNRESOLVED] = " ".join(entry.name for entry in metrics if entry.unresolved(run))
     return row

@@ -8,6 +8,7 @@ import pandas as pd
 
 from studies import Case, Record, Status, Study, load_runs
 
+FINISHED = Status.OK, Status.TUNNELLED, Status.FOLDED, Status.INVERTED, Status.SHAKEN, Status.DRIFTED
 PROMISED = 1e-4
 """Worst |V_r/V0_r − 1| of any kept volume, after any frame, at the default step [1]."""
 DEFAULT_FRACTION = 0.5

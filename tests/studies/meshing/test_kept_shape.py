@@ -7,14 +7,17 @@ import numpy as np
 import pytest
 
 from massspring import Sphere, Trajectory
+from massspring.world.trajectories import STILL
 from studies.base.errors import StudyError
 from studies.geometry import HalfSpace
 from studies.meshing import kept_shape
 from studies.meshing.kept_shape import (
     FACETS,
+    check_reach,
     held_area_error,
     held_facets,
     level_that_holds,
+    moments_of,
     tell_shape,
     touched_facets,
 )
@@ -93,6 +96,34 @@ def test_a_warning_names_few_facets_before_the_run(monkeypatch):
     monkeypatch.setattr(kept_shape, "FACETS", thin)
     assert not any("touch" in line for line in warnings_of(probed(0.01), mesh))
     assert touched_facets(BALL_CLAMPED, mesh) is None  # no probe
+
+
+@pytest.mark.parametrize(("radius", "refused"), [(0.001, True), (0.01, False)])
+def test_a_tool_that_passes_between_all_nodes_is_refused(radius, refused):
+    """Towards the middle of the facet farthest along x; not one that moves away."""
+    mesh = mesh_of(BALL_CLAMPED, TetrahedralBody(nodes=294))
+    middles = mesh.points[mesh.outer_triangles].mean(axis=1)
+    start = middles[np.argmax(middles[:, 0])] + [radius + 0.001, 0.0, 0.0]
+    path = Trajectory((0.0, 1.0), ((0.0, 0.0, 0.0), (-0.03, 0.0, 0.0)))
+    scene = replace(BALL_CLAMPED, obstacles=(Sphere(tuple(start), radius, path),))
+    still = replace(scene, held=tuple(replace(held, path=STILL) for held in scene.held))
+    reasons = {True: "passes between the nodes", False: r"sides are \d+ times as long \(allowed: 3.5\)"}
+    for at_nodes, reason in reasons.items():
+        if refused:
+            with pytest.raises(StudyError, match=f"obstacle 0, of radius 1 mm, .*{reason}.* use more nodes"):
+                check_reach(still, mesh, at_nodes)
+        else:
+            check_reach(still, mesh, at_nodes)
+        check_reach(scene, mesh, at_nodes)  # what is held moves: where the body will be is not known
+    away = Trajectory((0.0, 1.0), ((0.0, 0.0, 0.0), (0.03, 0.0, 0.0)))
+    check_reach(replace(still, obstacles=(Sphere(tuple(start), radius, away),)), mesh, True)
+
+
+def test_moments_leave_no_gap_wider_than_half_the_radius():
+    path = Trajectory((0.0, 1.0, 1.5, 4.0), ((0.0, 0.0, 0.0), (0.02, 0.0, 0.0), (0.02, 0.0, 0.0), (0.0, 0.01, 0.0)))
+    times = moments_of(Sphere((0.0, 0.0, 0.0), 0.003, path))
+    assert set(path.times) <= set(times) and times == sorted(set(times))
+    assert np.linalg.norm(np.diff(path(np.array(times)), axis=0), axis=1).max() <= 0.0015 + 1e-12
 
 
 def test_a_file_that_comes_as_it_is_has_its_own_shape(tmp_path):

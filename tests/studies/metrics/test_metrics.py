@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from massspring import Plane
-from studies.metrics.metrics import contact_facets, contact_turn, lumen_pressure_error
+from massspring import Plane, Sphere
+from studies.metrics.metrics import contact_facets, contact_turn, few_facets, lumen_pressure_error
 from studies.metrics.table import metric
 from studies.metrics.timing.protocol import FrameTiming
 from studies.runs.recipes import TetrahedralBody
@@ -234,3 +234,17 @@ def test_without_an_obstacle_there_is_neither():
     held = made_up_run.run()
     assert np.isnan(contact_facets(held)) and np.isnan(contact_turn(held))
     assert np.isnan(contact_turn(pressed(0.1, (0.0, 0.0, 0.0))))
+
+
+@pytest.mark.parametrize(("radius", "few"), [(0.1, False), (5.0, False), (0.004, True)])
+def test_few_facets_are_marked(radius, few):
+    """A ball that only just touches the top of the cube in the middle of a facet, one that is off it, and a wide one
+    that reaches all facets."""
+    made = pressed(0.1)
+    top = made_up_run.POINTS[made_up_run.TRIANGLES].mean(axis=1)[
+        np.argmax(made_up_run.POINTS[made_up_run.TRIANGLES].mean(axis=1)[:, 2])
+    ]
+    off = {0.1: 0.05, 5.0: -1.0, 0.004: 0.0}[radius]
+    tool = Sphere((top[0], top[1], top[2] + radius + off), radius)
+    scene = replace(made.case.scene, obstacles=(tool,))
+    assert few_facets(replace(made, case=replace(made.case, scene=scene))) == few

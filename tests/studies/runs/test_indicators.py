@@ -41,7 +41,15 @@ from tests.massspring.conftest import SOFT, block
 from tests.massspring.quadratic import quadratic_block
 from tests.studies.tiny import SQUEEZE, tiny_case
 
-GOOD = {"unknowns_per_volume": 3.0, "alternation": 0.1, "sway": 1e-3, "volume_off": 9e-5, "gained": 1e-4, "swing": 1e-3, "pace": 1.0}
+GOOD = {
+    "unknowns_per_volume": 3.0,
+    "alternation": 0.1,
+    "sway": 1e-3,
+    "volume_off": 9e-5,
+    "gained": 1e-4,
+    "swing": 1e-3,
+    "pace": 1.0,
+}
 
 
 def history(force=np.ones_like, good_frames=50, pressure=None, kinetic=0.0, work=1.0, gain=0.0) -> History:

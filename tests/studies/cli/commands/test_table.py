@@ -4,9 +4,9 @@ import pytest
 
 from massspring import ImplicitVolume, Xpbd
 from studies.cli.commands import table
-from studies.metrics.cells import UNCONVERGED_NOTE, value_cell
+from studies.metrics.cells import FEW_MARK, FEW_NOTE, UNCONVERGED_NOTE, value_cell
 from studies.metrics.metrics import METRICS
-from studies.metrics.table import UNRESOLVED, row_of
+from studies.metrics.table import FEW_FACETS, UNRESOLVED, row_of
 from studies.report.page.markup import table as page_table
 from studies.report.summary import results_of
 from studies.scene.library import BALL_CLAMPED
@@ -90,3 +90,15 @@ def test_a_method_that_does_not_converge_is_marked_in_every_table(capsys):
     assert "§" not in capsys.readouterr().out and "§" not in results_of([ours])
     shown = page_table([{**one, "case": "0", "study": "tiny"} for one in rows], {})["rows"]
     assert [one["lines"][1] for one in shown] == ["implicit_volume", "xpbd §"]
+
+
+def test_a_row_with_few_facets_is_marked(capsys):
+    table.draw([row(**{FEW_FACETS: True}), row(method="implicit_volume", **{FEW_FACETS: False})], CHOSEN, False)
+    out = capsys.readouterr().out
+    assert [line.split()[1] == FEW_MARK for line in out.splitlines() if line.startswith(("  free", "  implicit"))] == [
+        True,
+        False,
+    ]
+    assert FEW_NOTE in out
+    table.draw([row()], CHOSEN, False)
+    assert FEW_MARK not in capsys.readouterr().out
