@@ -63,7 +63,7 @@ def test_a_rod_is_inside_where_both_its_ends_are_outside():
     assert deepest(beside, *_flat(), 0.0) == (pytest.approx(0.05 - 0.125, abs=0.04), False)
 
 
-@pytest.mark.parametrize("tool", [sphere(along_z(2.0, -2.0)), Capsule((-2, 0, 0), (2, 0, 0), 0.1, along_z(2.0, -2.0))])
+@pytest.mark.parametrize("tool", [sphere(along_z(2.0, -2.0)), Capsule((-2, 0, 0), (10, 0, 0), 0.1, along_z(2.0, -2.0))])
 def test_what_goes_through_within_a_frame_is_seen(tool):
     """A rod sideways: its ends pass beside the body."""
     points, triangles = BALL
