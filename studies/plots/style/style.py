@@ -67,6 +67,7 @@ STATUS_LOOKS: dict[Status, tuple[str, str]] = {
     Status.FOLDED: (MUTED[5], "<"),
     Status.INVERTED: (PURPLE, "v"),
     Status.TUNNELLED: (MUTED[7], ">"),
+    Status.SHAKEN: (MUTED[6], "h"),
     Status.DRIFTED: (YELLOW, "D"),
     Status.DIVERGED: (BLACK, "X"),
     Status.NOT_CONVERGED: (ORANGE, "P"),
