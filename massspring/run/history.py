@@ -207,10 +207,11 @@ class Recorder:
     def _at_end(self, impulse: np.ndarray, earlier: np.ndarray, steps: int) -> np.ndarray:
         """The force [N] at the end of a frame of so many steps from its impulse [N s], all and before the last step,
         (k, 3): on the line through the means of the last step and of those before it, each in the middle of its
-        time."""
+        time, where the force of the last step does not lie beyond."""
         dt = self.clock.frame / steps
         last = (impulse - earlier) / dt
-        return last if steps == 1 else last + (last - earlier / (dt * (steps - 1))) / steps
+        end = last if steps == 1 else last + (last - earlier / (dt * (steps - 1))) / steps
+        return np.where(end * last > 0.0, end, last)
 
     def record_energy(self, frame: int, account: EnergyAccount) -> None:
         """Records the energies after a frame."""

@@ -8,14 +8,14 @@ MISSING = "–"
 UNRESOLVED_MARK = "†"
 """Mark of an error that is less than ten times the uncertainty of the reference."""
 UNRESOLVED_NOTE = f"{UNRESOLVED_MARK} unresolved: the uncertainty of the reference is more than a tenth of this error"
+FEW_MARK = "‡"
+FEW_NOTE = f"{FEW_MARK} a sphere or capsule touches fewer than {FEW} facets: its force may be off by tens of percent"
 UNCONVERGED_MARK = "§"
 """Mark of a method without `Capabilities.converged`."""
 UNCONVERGED_NOTE = (
     f"{UNCONVERGED_MARK} not converged: the answer depends on the step and on the order of elements, which ± does not "
     "contain"
 )
-FEW_MARK = "‡"
-FEW_NOTE = f"{FEW_MARK} a sphere or capsule touches fewer than {FEW} facets: its force may be off by tens of percent"
 MINUS = "−"
 
 

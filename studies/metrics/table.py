@@ -9,7 +9,7 @@ import pandas as pd
 from massspring.methods.capabilities import No
 from studies.base.errors import StudyError
 from studies.base.lookup import lookup
-from studies.metrics.cells import UNCONVERGED_MARK
+from studies.metrics.cells import FEW_MARK, UNCONVERGED_MARK
 from studies.metrics.metric import Metric
 from studies.metrics.metrics import METRICS, few_facets
 from studies.metrics.run import Run
@@ -66,8 +66,9 @@ def frame_of(rows: Sequence[Row]) -> pd.DataFrame:
 
 
 def marked(row: Mapping[Any, Any]) -> str:
-    """The method of a row, with UNCONVERGED_MARK if it is not converged."""
-    return f"{row['method']} {UNCONVERGED_MARK}" if row.get(UNCONVERGED) else row["method"]
+    """The method of a row, with UNCONVERGED_MARK if it is not converged, and FEW_MARK if it touches few facets."""
+    marks = [mark for key, mark in ((UNCONVERGED, UNCONVERGED_MARK), (FEW_FACETS, FEW_MARK)) if row.get(key)]
+    return " ".join([row["method"], *marks])
 
 
 def row_of(run: Run, metrics: Sequence[Metric]) -> Row:

@@ -4,10 +4,10 @@ each rung of the ladder of bodies."""
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from typing import Any, NamedTuple
 
-from studies.metrics.cells import MISSING, UNCONVERGED_NOTE, UNRESOLVED_MARK, UNRESOLVED_NOTE, value_cell
+from studies.metrics.cells import FEW_NOTE, MISSING, UNCONVERGED_NOTE, UNRESOLVED_MARK, UNRESOLVED_NOTE, value_cell
 from studies.metrics.judged import Judged, Measured, cheapest, judged, nearest, over_meshes
 from studies.metrics.run import Run
-from studies.metrics.table import UNCONVERGED, UNRESOLVED, marked, study_table
+from studies.metrics.table import FEW_FACETS, UNCONVERGED, UNRESOLVED, marked, study_table
 from studies.metrics.wish import Wish, usual_wish
 from studies.runs.recipe_text import body_words
 from studies.scene.scene import Scene
@@ -36,6 +36,8 @@ def results_of(runs: Sequence[Run]) -> str:
         lines += ["", UNRESOLVED_NOTE]
     if rows[UNCONVERGED].any():
         lines += ["", UNCONVERGED_NOTE]
+    if FEW_FACETS in rows and rows[FEW_FACETS].any():
+        lines += ["", FEW_NOTE]
     return "\n".join(lines)
 
 

@@ -41,6 +41,8 @@ def check_clock(scene: Scene, file: str = "") -> None:
 def frames_between(scene: Scene, frames: int) -> int:
     """The least number from `frames` on of equal frames of which one ends at each checkpoint of the scene. Raises
     StudyError where MORE times as many are too few."""
+    if not scene.duration > 0:
+        return frames  # refused elsewhere
     shares = np.array(scene.checkpoints) / scene.duration
     for count in range(frames, max(MORE * frames, LEAST_MORE) + 1):
         if (np.abs(shares * count - np.round(shares * count)) < SAME * count).all():

@@ -17,7 +17,7 @@ from studies.store.ledger import Ledger
 from studies.sweep.job import CaseJob
 
 NODES, FRAMES = 60, 5
-SQUEEZE = replace(BALL_SQUEEZE, name="tiny_squeeze", reference=None)
+SQUEEZE = replace(BALL_SQUEEZE, name="tiny_squeeze", reference=None, checkpoints=(0.8, 1.6, 2.4, 4.0))
 MESHED = ("ball", "liver", "bladder")
 """Organs that every run of the tests meshes for their scenes: a free one, a held one, a hollow one."""
 CUBE = np.array([[0, 1, 3, 7], [0, 3, 2, 7], [0, 2, 6, 7], [0, 6, 4, 7], [0, 4, 5, 7], [0, 5, 1, 7]])

@@ -11,15 +11,7 @@ from studies.base.lookup import lookup
 from studies.catalog import Study
 from studies.cli.terminal import Results, StudyName, busy, console, say, warn
 from studies.exchange.entry import entries_beside
-from studies.metrics.cells import (
-    FEW_MARK,
-    FEW_NOTE,
-    MISSING,
-    UNCONVERGED_NOTE,
-    UNRESOLVED_NOTE,
-    plain,
-    value_cell,
-)
+from studies.metrics.cells import FEW_NOTE, MISSING, UNCONVERGED_NOTE, UNRESOLVED_NOTE, plain, value_cell
 from studies.metrics.metric import Metric
 from studies.metrics.metrics import METRICS
 from studies.metrics.table import FEW_FACETS, UNCONVERGED, UNRESOLVED, frame_of, marked, row_of
@@ -91,8 +83,7 @@ def draw(rows: Sequence[Row], metrics: list[Metric], every: bool) -> None:
     differing = [key for key in SETTINGS if any(len(values(group, key)) > 1 for group in of_groups)]
     of_heading = [key for key in SETTINGS if key not in differing and len(values(rows, key)) > 1]
     height = 1 + max((len(metric.name.split("_")) for metric in metrics), default=0)
-    names = [f"  {marked(row)}" + f" {FEW_MARK}" * bool(row.get(FEW_FACETS)) for row in rows]
-    labels = [column(height, [""], names, str.ljust)]
+    labels = [column(height, [""], [f"  {marked(row)}" for row in rows], str.ljust)]
     labels += [column(height, [key], [setting(row, key) for row in rows], str.ljust) for key in differing]
     if any(row["status"] != "ok" for row in rows):
         labels.append(column(height, ["status"], [row["status"] for row in rows], str.ljust))
@@ -119,10 +110,10 @@ def draw(rows: Sequence[Row], metrics: list[Metric], every: bool) -> None:
             break
     if any(row[UNRESOLVED] for row in rows):
         say(UNRESOLVED_NOTE)
-    if any(row.get(UNCONVERGED) for row in rows):
-        say(UNCONVERGED_NOTE)
     if any(row.get(FEW_FACETS) for row in rows):
         say(FEW_NOTE)
+    if any(row.get(UNCONVERGED) for row in rows):
+        say(UNCONVERGED_NOTE)
     if rest:
         say(f"not shown (--all, --csv FILE, --metrics): {', '.join(metric.name for metric in rest)}")
 

@@ -20,8 +20,10 @@ from tests.massspring.conftest import SOFT
 from tests.massspring.quadratic import quadratic_block
 
 SECONDS = 0.3
-GAINED, LOST = 0.002, {"plane": 0.05, "sphere": 0.02, "pull": 0.002, "gravity": 0.002, "fill": 0.002}
-"""Largest energy above and below the work, over the largest energy, of 480 steps; 120 steps are off by 0.0024."""
+GAINED = {"plane": 0.002, "sphere": 0.002, "pull": 0.002, "gravity": 0.002, "fill": 0.006}
+LOST = {"plane": 0.05, "sphere": 0.02, "pull": 0.002, "gravity": 0.002, "fill": 0.002}
+"""Largest energy above and below the work, over the largest energy, of 480 steps; 120 steps are off by 0.0024. The work
+of a fill takes pressures at the ends of frames: 0.005 in 12 frames, 0.001 in 120."""
 
 
 def path(*way: float) -> Trajectory:
@@ -69,7 +71,7 @@ def test_without_damping_a_body_has_the_energy_that_was_put_in(quadratic, hollow
     energy = history.kinetic + history.elastic
     off = (energy - history.work) / energy.max()
     assert history.outcome == "finished" and energy.max() > 1e-5
-    assert -LOST[kind] < off.min() and off.max() < GAINED
+    assert -LOST[kind] < off.min() and off.max() < GAINED[kind]
 
 
 @pytest.mark.parametrize("kind", ["plane", "sphere", "pull"])

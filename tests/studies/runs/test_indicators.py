@@ -116,7 +116,7 @@ def test_what_a_body_gains_is_what_it_has_more_than_it_was_given(gain, share):
 def test_a_swing_is_the_motion_left_where_nothing_moves():
     still = np.where(np.arange(50) < 25, 1.0, 1e-4)
     assert swing(SQUEEZE, history(kinetic=still)) == pytest.approx(0.01)
-    assert np.isnan(swing(SQUEEZE, history(kinetic=still, good_frames=26)))
+    assert np.isnan(swing(SQUEEZE, history(kinetic=still, good_frames=25)))
 
 
 def test_the_pace_is_that_of_the_masses_where_the_body_moves():

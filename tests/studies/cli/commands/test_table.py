@@ -77,6 +77,18 @@ def test_the_status_is_a_column_where_a_run_did_not_end_well(capsys):
     assert out[-1].split()[:2] == ["penalty", "diverged"] and out[-2].split()[:2] == ["free", "ok"]
 
 
+def test_a_row_with_few_facets_is_marked(capsys):
+    table.draw([row(**{FEW_FACETS: True}), row(method="implicit_volume", **{FEW_FACETS: False})], CHOSEN, False)
+    out = capsys.readouterr().out
+    assert [line.split()[1] == FEW_MARK for line in out.splitlines() if line.startswith(("  free", "  implicit"))] == [
+        True,
+        False,
+    ]
+    assert FEW_NOTE in out
+    table.draw([row()], CHOSEN, False)
+    assert FEW_MARK not in capsys.readouterr().out
+
+
 def test_a_method_that_does_not_converge_is_marked_in_every_table(capsys):
     """By what the method says of itself; with a line that says what the mark means."""
     ours, theirs = (run(BALL_CLAMPED, method=method, error=3.0) for method in (ImplicitVolume(), Xpbd()))
@@ -90,15 +102,3 @@ def test_a_method_that_does_not_converge_is_marked_in_every_table(capsys):
     assert "§" not in capsys.readouterr().out and "§" not in results_of([ours])
     shown = page_table([{**one, "case": "0", "study": "tiny"} for one in rows], {})["rows"]
     assert [one["lines"][1] for one in shown] == ["implicit_volume", "xpbd §"]
-
-
-def test_a_row_with_few_facets_is_marked(capsys):
-    table.draw([row(**{FEW_FACETS: True}), row(method="implicit_volume", **{FEW_FACETS: False})], CHOSEN, False)
-    out = capsys.readouterr().out
-    assert [line.split()[1] == FEW_MARK for line in out.splitlines() if line.startswith(("  free", "  implicit"))] == [
-        True,
-        False,
-    ]
-    assert FEW_NOTE in out
-    table.draw([row()], CHOSEN, False)
-    assert FEW_MARK not in capsys.readouterr().out
