@@ -31,6 +31,8 @@ WAVERS = 0.03
 """Of the kinetic energy: explicit steps keep the energy of a free swing within so much, to either side."""
 SWINGS = 0.01
 """Bound of the swing at rest: of displacements it is the target of the mean error."""
+SHORTENED = 2.0
+"""Bound of how many times shorter a load makes the steps."""
 MOVES, PACE = 1e-3, 0.02
 """Kinetic energy over the largest energy from which a run shows a motion, and bound of the error of its pace."""
 
@@ -48,7 +50,14 @@ def indicators(scene: Scene, body: Body, history: History, lumen: int, keeps: bo
         "gained": gained(history),
         "swing": swing(scene, history),
         "pace": pace(history),
+        "shortened": shortened(history),
     }
+
+
+def shortened(history: History) -> float:
+    """Most steps of a frame over the least [1]: a load that lowers the stability limit shortens them."""
+    steps = history.steps[: history.good_frames]
+    return float(steps.max() / steps.min()) if len(steps) else float("nan")
 
 
 def largest_energy(history: History) -> float:
@@ -111,6 +120,11 @@ def remarks(signs: dict[str, float]) -> list[str]:
         lines.append(
             f"the kept volume is up to {100 * signs['volume_off']:.2g} % off (bound {100 * VOLUME_OFF:g} %); a body "
             "that turns at omega is (omega dt)² too large: halve the step for a quarter of it"
+        )
+    if signs["shortened"] > SHORTENED:
+        lines.append(
+            f"to stay stable under the load, steps are up to {signs['shortened']:.2g} times shorter than at rest, and the "
+            "frames with it take as many times longer"
         )
     return lines
 

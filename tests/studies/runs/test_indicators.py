@@ -49,6 +49,7 @@ GOOD = {
     "gained": 1e-4,
     "swing": 1e-3,
     "pace": 1.0,
+    "shortened": 1.5,
 }
 
 
@@ -66,6 +67,7 @@ def history(force=np.ones_like, good_frames=50, pressure=None, kinetic=0.0, work
         pressure=np.zeros((50, 1)) if pressure is None else pressure,
         volume=np.ones((50, 1)),
         volume_target=np.ones((50, 1)),
+        steps=np.where(np.arange(50) < 25, 4, 10),
         kinetic=kinetic * np.ones(50),
         tissue_kinetic=0.25 * kinetic * np.ones(50),
         work=work * np.ones(50),
@@ -166,7 +168,12 @@ def test_a_checkerboard_counts_and_a_gradient_does_not():
     [
         ({"unknowns_per_volume": 0.6}, "locks"),
         ({"alternation": 0.6}, "alternate"),
-        ({"sway": 2 * SWAYS}, "oscillates"),
+        ({"sway": 2 * SWAYS}, "oscillates by 2 % at the end while nothing outside moves; give the scene more"),
+        ({"sway": 2 * SWAYS, "gained": 2 * FEEDS}, "oscillates by 2 % at the end while nothing outside moves; halve"),
+        ({"swing": 2 * SWINGS}, "swings by 2 %"),
+        ({"pace": 1.34}, "34 % too fast"),
+        ({"pace": 0.9}, "10 % too slow"),
+        ({"shortened": 2.5}, "2.5 times shorter"),
         ({"volume_off": 2.5e-3}, "0.25 % off (bound 0.01 %)"),
     ],
 )
