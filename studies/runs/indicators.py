@@ -122,9 +122,9 @@ def remarks(signs: dict[str, float]) -> list[str]:
             "that turns at omega is (omega dt)² too large: halve the step for a quarter of it"
         )
     if signs["shortened"] > SHORTENED:
+        times = signs["shortened"]
         lines.append(
-            f"to stay stable under the load, steps are up to {signs['shortened']:.2g} times shorter than at rest, and the "
-            "frames with it take as many times longer"
+            f"to stay stable under the load, steps are up to {times:.2g} times shorter than at rest; frames take longer"
         )
     return lines
 

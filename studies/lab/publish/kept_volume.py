@@ -32,7 +32,7 @@ def kept_volumes(results: Path, studies: Sequence[Study]) -> pd.DataFrame:
     rows = dict[str, dict[str, object]]()
     for study in studies:
         for run in load_runs(results, study)[0]:
-            if not promised(run.case) or run.record.status not in COMPARABLE:
+            if not promised(run.case) or run.record.status not in FINISHED:
                 continue
             case, attributes, worst = run.case, run.record.attributes, worst_volume(run.record)
             rows[case.replaced(recorded=()).key] = {
