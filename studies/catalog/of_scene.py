@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 from massspring import Free, ImplicitVolume
-from studies.catalog.accuracy import FINEST, LONG, even, graded
+from studies.catalog.accuracy import FINEST, LONG, SHORT, even, graded
 from studies.catalog.study import Chart, Study
 from studies.runs.case import Case
 from studies.runs.recipes import BodyRecipe, TetrahedralBody
@@ -11,6 +11,8 @@ from studies.scene.library import LIVER_PROBE
 from studies.scene.scene import Scene
 
 RECORDED = ("surface",)
+SHARES = SHORT, LONG
+"""Of the step limit, for the coarser and the finer of the two meshes: they do not share what a long step does."""
 BODIES = "bodies"
 """Stands for the study of a folder of surfaces where no other is named."""
 
@@ -22,7 +24,10 @@ def study_of(scene: Scene) -> Study:
     cases = (
         Case(scene, TetrahedralBody(), Free(), recorded=RECORDED),
         Case(scene, TetrahedralBody(), ImplicitVolume(), recorded=RECORDED),
-        *(Case(scene, body, ImplicitVolume(), dt_fraction=LONG, recorded=RECORDED) for body in _two_meshes(scene)),
+        *(
+            Case(scene, body, ImplicitVolume(), dt_fraction=share, recorded=RECORDED)
+            for body, share in zip(_two_meshes(scene), SHARES, strict=True)
+        ),
     )
     charts = (
         Chart("volume.png", "studies.plots.volume_history:draw"),
