@@ -206,12 +206,15 @@ class Recorder:
 
     def _at_end(self, impulse: np.ndarray, earlier: np.ndarray, steps: int) -> np.ndarray:
         """The force [N] at the end of a frame of so many steps from its impulse [N s], all and before the last step,
-        (k, 3): on the line through the means of the last step and of those before it, each in the middle of its
-        time, where the force of the last step does not lie beyond."""
+        (k, 3): along that of the last step, as large as the line through the means of the last step and of those
+        before it, each in the middle of its time."""
         dt = self.clock.frame / steps
         last = (impulse - earlier) / dt
-        end = last if steps == 1 else last + (last - earlier / (dt * (steps - 1))) / steps
-        return np.where(end * last > 0.0, end, last)
+        if steps == 1:
+            return last
+        size, before = (np.linalg.norm(f, axis=1) for f in (last, earlier / (dt * (steps - 1))))
+        larger = np.divide(size - before, steps * size, out=np.zeros_like(size), where=size > 0.0)
+        return np.maximum(1.0 + larger, 0.0)[:, None] * last
 
     def record_energy(self, frame: int, account: EnergyAccount) -> None:
         """Records the energies after a frame."""

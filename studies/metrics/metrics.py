@@ -218,7 +218,8 @@ def contact_facets(run: Run) -> float:
 def few_facets(run: Run) -> bool:
     """Whether a sphere or capsule touches at least one and fewer than FEW outer facets at the last checkpoint: its
     nearest point of each within 0.1 % of the size."""
-    sides, scene = run.sides, run.case.scene
+    scene = run.case.scene
+    sides = run.sides if run.record.fields else None  # a case that failed has none
     if sides is None or not len(run.fields.snapshots):
         return False
     x, facets, t = run.fields.snapshots[-1], sides[OUTER].facets, scene.checkpoints[-1]

@@ -27,7 +27,7 @@ SHAKES, FEEDS = 0.003, 0.001
 """Energy that a body gains by itself, over its largest energy: bound of every run, and of one that swings while nothing
 moves it. Sound runs gain up to 0.0006; a kidney between planes whose contact lags behind its volumes by a step gains
 0.005 at 0.8 of the step limit and is 7 % wrong, at 0.6 of it 0.0015 and 2 %."""
-WAVERS = 0.03
+WAVERS = 0.1
 """Of the kinetic energy: explicit steps keep the energy of a free swing within so much, to either side."""
 SWINGS = 0.01
 """Bound of the swing at rest: of displacements it is the target of the mean error."""

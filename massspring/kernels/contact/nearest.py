@@ -73,7 +73,7 @@ def nearest_of_triangle(p, q, r, a):
 
 @njit_inlined
 def shape_at(b):
-    """Quadratic shape functions of corners and mid-sides at barycentric coordinates b (3)."""
+    """Quadratic shape functions of corners and mid-sides at three barycentric coordinates b."""
     return (
         b[0] * (2.0 * b[0] - 1.0),
         b[1] * (2.0 * b[1] - 1.0),

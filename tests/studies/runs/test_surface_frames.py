@@ -34,7 +34,7 @@ def stored(mesh_cache, tmp_path_factory):
 def every_frame(mesh_cache):
     """The positions of the same run after every frame, kept in memory."""
     prepared = prepare(CASE)
-    return prepared, simulate(prepared.setup, range(1, FRAMES + 1), extra=())
+    return prepared, simulate(prepared.setup, range(1, FRAMES + 1))
 
 
 def test_the_frames_are_the_run_s_own_positions(stored, every_frame):

@@ -183,7 +183,7 @@ def test_a_block_slides_above_the_angle_of_friction():
     force = history.contact_force[:, 0]
     # Points stick and slip by turns: 24 moments are a sample.
     assert force[20:, 0].mean() == pytest.approx(-FRICTION * force[20:, 2].mean(), rel=5e-2)
-    assert force[:, 2].mean() == pytest.approx(slab().mass.sum() * WEAK * np.cos(np.radians(40.0)), rel=0.03)
+    assert force[:, 2].mean() == pytest.approx(slab().mass.sum() * WEAK * np.cos(np.radians(40.0)), rel=0.05)
 
 
 @pytest.mark.parametrize("friction", [0.0, 0.3, "no_slip"])

@@ -59,19 +59,19 @@ def driven(body: Body, obstacles: tuple[Plane, ...] = (), held: tuple[Attachment
     return history
 
 
-def middles(history: History) -> np.ndarray:
-    """Share of the way at the middle of each frame, for which its mean force stands."""
-    return (history.t - 0.5 * history.t[0]) / SECONDS
+def ends(history: History) -> np.ndarray:
+    """Share of the way at the end of each frame."""
+    return history.t / SECONDS
 
 
 def pressing(history: History) -> np.ndarray:
-    """Mean of the forces of the two plates in each frame [N], (F,)."""
+    """Mean of the forces of the two plates at the end of each frame [N], (F,)."""
     return 0.5 * (history.contact_force[:, 0, 2] - history.contact_force[:, 1, 2])
 
 
 def worst_force(history: History, to: float, exact: Callable) -> float:
     """Largest error of the pressing force over `exact` of the stretch along z [N], over the path up to `to`."""
-    squeezed = to * middles(history)
+    squeezed = to * ends(history)
     begun = squeezed > BEGUN
     return float(np.abs(pressing(history) / exact(1.0 - squeezed) - 1.0)[begun].max())
 
@@ -99,7 +99,7 @@ def test_a_block_whose_sides_are_held_is_in_simple_shear(block):
     heights, level = np.unique(block.rest[sides, 2].round(9), return_inverse=True)
     groups = tuple(Attachment(sides[level == k], slow((z - middle, 0.0, 0.0))) for k, z in enumerate(heights))
     history = driven(block, held=groups)
-    sheared = middles(history)
+    sheared = ends(history)
     force = history.held_force[:, :, 0] @ (heights - middle) / block.volume
     assert np.abs(force / (MU * sheared) - 1.0)[sheared > 2.0 * BEGUN].max() < 0.01
     assert np.abs(history.pressure).max() < 0.01 * MU
@@ -113,6 +113,6 @@ def test_a_cylinder_between_sticking_plates_follows_the_reference():
     body = quadratic_body(*round_bricks(4, RADIUS, HEIGHT), SOFT, inertia="stiffness")
     history = driven(body, plates(HEIGHT, 0.42, "no_slip"))
     at = STICKING[:, 0]
-    force = np.interp(at, 0.42 * middles(history), pressing(history))
+    force = np.interp(at, 0.42 * ends(history), pressing(history))
     assert np.abs(force / STICKING[:, 1] - 1.0).max() < 0.055
     assert history.min_j.min() > 0.05

@@ -164,8 +164,9 @@ def test_a_sphere_presses_without_pulling_and_lets_go(solid, method):
     way = Trajectory((0.0, 0.5, 1.0), ((0, 0, 0), (0, 0, -0.01), (0, 0, 0.01)))
     probe = Sphere((*map(float, middle), float(top) + 0.031), 0.03, way)
     setup = Setup(solid, method, Clock(0.02, 60, 1), (probe,), (Attachment(bottom(solid)),), damping=20.0)
-    history = simulate(setup)
-    assert history.outcome == "finished" and history.penetration.max() < 1e-7
+    history = simulate(setup, range(1, 61))
+    gaps = [probe.gap(x, t).min() for x, t in zip(history.snapshots, history.t, strict=True)]
+    assert history.outcome == "finished" and min(gaps) > -1e-7
     assert history.contact_force[:, 0, 2].max() < 1e-9 and history.contact_force[24, 0, 2] < -0.01
     assert np.abs(history.contact_force[-1]).max() == 0.0
 
