@@ -179,11 +179,11 @@ def test_a_scene_that_was_never_run_gets_the_worst_of_its_kind(tmp_path, never_t
 
 def test_runs_of_the_scene_of_a_user_count_more_than_those_of_other_scenes(tmp_path, monkeypatch, never_timed):
     results, mine = publish(tmp_path, rows_of(LIVER_PROBE)), replace(LIVER_PROBE, name="mine", duration=9.0)
-    stored = run(mine, "quadratic", error=0.02, **GRADED_RUN | {"nodes": 1194})
+    stored = run(mine, "quadratic", error=0.02, **GRADED_RUN | {"nodes": 1594})
     stored_runs(monkeypatch, stored)
     advice = advise(mine, results=results, timing=False)
     assert advice.alike == () and advice.stored.where == str(results / "mine")
-    assert body(advice).nodes == 1194 and advice.chosen.force.value == pytest.approx(-2.0)
+    assert body(advice).nodes == 1594 and advice.chosen.force.value == pytest.approx(-2.0)
     lines = "\n".join(lines_of(advice))
     assert f"organbench run FILE.py --case {advice.chosen.case.name}" in lines and "on one mesh" in lines
 
