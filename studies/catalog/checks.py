@@ -3,15 +3,15 @@
 from studies.catalog.study import Study
 from studies.metrics.table import check_columns
 from studies.scene.checks import check_scene
-from studies.scene.clock import event_frames
+from studies.scene.clock import event_frames, frames_between
 from studies.store.schema import Status
 
 
 def check_study(study: Study, drawn: bool = True) -> list[str]:
     """Warnings of numbers that are hardly meant; `drawn`: whether its charts will be.
 
-    Raises StudyError for a chart without a function, a column that is no metric, and for a scene that cannot start
-    (studies.scene.checks) in a study that does not expect failures.
+    Raises StudyError for a chart without a function, a column that is no metric, and for checkpoints that no frames end
+    at and a scene that cannot start (studies.scene.checks) in a study that does not expect failures.
     """
     check_columns(study.columns)
     for chart in study.charts if drawn else ():
@@ -19,7 +19,7 @@ def check_study(study: Study, drawn: bool = True) -> list[str]:
     if study.accepts(Status.FAILED):
         return []
     for case in study.cases:
-        if case.frames:
-            for cut in case.scene.cuts:
-                event_frames(case.scene, cut, case.frames)
+        frames = frames_between(case.scene, case.frames or case.scene.frames)
+        for cut in case.scene.cuts:
+            event_frames(case.scene, cut, frames)
     return [sentence for scene in study.scenes for sentence in check_scene(scene)]

@@ -37,9 +37,9 @@ MOVES, PACE = 1e-3, 0.02
 """Kinetic energy over the largest energy from which a run shows a motion, and bound of the error of its pace."""
 
 
-def indicators(scene: Scene, body: Body, history: History, lumen: int, keeps: bool) -> dict[str, float]:
+def indicators(scene: Scene, body: Body, history: History, lumen: int, keeps: bool, steps: int) -> dict[str, float]:
     """Attributes of a run (RUN_ATTRIBUTES); NaN if they do not apply. lumen: column of the lumen, or −1; keeps: whether
-    the method claims to keep volumes."""
+    the method claims to keep volumes; steps: of a frame at rest."""
     pressure = history.pressure[history.good_frames - 1] if history.good_frames else history.pressure[:0]
     alternation = unlike_neighbours(pressure, neighbours(body.kept, lumen)) if len(pressure) else np.nan
     return {
@@ -50,20 +50,14 @@ def indicators(scene: Scene, body: Body, history: History, lumen: int, keeps: bo
         "gained": gained(history),
         "swing": swing(scene, history),
         "pace": pace(history),
-        "shortened": shortened(history),
+        "shortened": float(history.steps.max()) / steps,
     }
 
 
-def shortened(history: History) -> float:
-    """Most steps of a frame over the least [1]: a load that lowers the stability limit shortens them."""
-    steps = history.steps[: history.good_frames]
-    return float(steps.max() / steps.min()) if len(steps) else float("nan")
-
-
 def largest_energy(history: History) -> float:
-    """Of the body, or work that it took [J]; NaN without a frame."""
+    """Of the body, or work that it took where that is known [J]; NaN without a frame."""
     sizes = history.kinetic + history.elastic, np.abs(history.work)
-    return float(np.nanmax(sizes)) if history.good_frames and np.isfinite(history.work[0]) else float("nan")
+    return float(np.nanmax(sizes)) if history.good_frames else float("nan")
 
 
 def gained(history: History) -> float:

@@ -62,7 +62,7 @@ def measure(case: Case, on_frame: Callable[[int], object] | None = None) -> Reco
             return _record(case, Status.FAILED, own, {"warnings": _warning_text(caught)}, {})
     status, message = status_of(case, history)
     keeps = case.method.volume_tol is not None
-    signs = indicators(case.scene, prepared.body, history, _lumen_column(prepared), keeps)
+    signs = indicators(case.scene, prepared.body, history, _lumen_column(prepared), keeps, prepared.setup.clock.steps)
     text = "; ".join(filter(None, [_warning_text(caught), *remarks(signs)]))
     attributes = {**_attributes(prepared, history), **signs, "warnings": text}
     return _record(case, status, message, attributes, _fields(case, prepared, history))

@@ -142,7 +142,7 @@ class RunAttributes(Timed):
     sway = optional_value(float, "1", "range of the force at rest about its trend, over its mean")
     gained = optional_value(float, "1", "energy that the body gains by itself, over its largest energy")
     swing = optional_value(float, "1", "root of the kinetic over the largest energy at the end, where loads rest")
-    shortened = optional_value(float, "1", "most steps of a frame over the least: loads shorten them")
+    shortened = optional_value(float, "1", "most steps of a frame over those at rest: loads shorten steps")
     pace = optional_value(float, "1", "how many times as fast as with the masses of the tissue the body moves")
     warnings = value(str, "", "what preparing the case warned of, and what its indicators report")
     entry = optional_value(str, "", "of an entry from outside: its file, with the SHA-256 of its positions")

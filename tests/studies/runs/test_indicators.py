@@ -183,12 +183,29 @@ def test_each_indicator_has_a_remark_beyond_its_bound(changed, word):
     assert word in remark
 
 
+def test_steps_are_compared_with_those_at_rest():
+    """Also where a load is there from the first frame on."""
+    body = quadratic_body(*quadratic_block((1, 1, 1)), SOFT)
+    made = history(pressure=np.zeros((50, body.kept.count)))
+    assert indicators(SQUEEZE, body, made, -1, True, 2)["shortened"] == 5.0
+
+
+def test_the_pace_is_known_where_the_work_is_not():
+    unknown = history(kinetic=0.1)
+    assert pace(of_unknown_work(unknown)) == pytest.approx(0.5) and np.isnan(gained(of_unknown_work(unknown)))
+
+
+def of_unknown_work(made: History) -> History:
+    """The same of a method that stores energy in other ways too."""
+    return cast(History, SimpleNamespace(**vars(made) | {"work": np.full(50, np.nan)}))
+
+
 def test_pressures_are_those_of_the_last_good_frame():
     body = quadratic_body(*quadratic_block((1, 1, 1)), SOFT)
     pressure = np.full((50, body.kept.count), np.nan)
     pressure[1] = 7.0
     ended = history(np.ones_like, good_frames=2, pressure=pressure)
-    assert indicators(SQUEEZE, body, ended, -1, True)["alternation"] == 0.0
+    assert indicators(SQUEEZE, body, ended, -1, True, 4)["alternation"] == 0.0
 
 
 @pytest.mark.parametrize("omega", [1.0, 20.0])
@@ -199,10 +216,10 @@ def test_a_body_that_turns_is_too_large_by_the_square_of_its_angle_in_a_step(ome
     spin = np.cross([0.0, 0.0, omega], body.rest - body.mass @ body.rest / body.mass.sum())
     for method, expected in ((ImplicitVolume(), (omega * dt) ** 2), (Shake(), 0.0)):
         made = simulate(Setup(body, method, Clock(4 * dt, 20, 4), velocity=spin))
-        off = indicators(SQUEEZE, body, made, -1, True)["volume_off"]
+        off = indicators(SQUEEZE, body, made, -1, True, 4)["volume_off"]
         assert off == pytest.approx(expected, rel=0.1, abs=1e-12)
         assert bool(remarks(GOOD | {"volume_off": off})) == (expected > 1e-4)
-    assert np.isnan(indicators(SQUEEZE, body, made, -1, False)["volume_off"])
+    assert np.isnan(indicators(SQUEEZE, body, made, -1, False, 4)["volume_off"])
 
 
 def test_a_record_has_them(mesh_cache):

@@ -86,6 +86,9 @@ def test_a_reference_that_failed_is_exit_code_1(organbench, tmp_path, file_of, l
 
 
 WRONG = {
+    "equal frames of 4 s ends at the checkpoints (0.333, 4.0) s; round these": (
+        "cases=(tiny_case(scene=replace(SQUEEZE, checkpoints=(0.333, 4.0))),)"
+    ),
     "obstacle 0 starts 40 mm inside": "cases=(tiny_case(scene=replace(SQUEEZE, obstacles=(SUNK,))),)",
     "unknown metric 'volume_wort'": "columns=('volume_wort',)",
     "'../elsewhere' cannot name a study": "name='../elsewhere'",
