@@ -72,8 +72,12 @@ def entry_path(root: Path, case: Case) -> Path:
 
 def entry_name(case: Case) -> str:
     """SCENE-MESH-NODES-NAME."""
-    mesh = "curved" if case.body.kind == "quadratic" else "straight"
-    return f"{case.scene.name}-{mesh}-{case.body.nodes}-{case.method.name}"
+    return f"{case.scene.name}-{sides_of(case)}-{case.body.nodes}-{case.method.name}"
+
+
+def sides_of(case: Case) -> str:
+    """Of the elements of the mesh on which an entry was handed in."""
+    return "curved" if case.body.kind == "quadratic" else "straight"
 
 
 def run_of_entry(record: Record, reference: Reference | None) -> Run:

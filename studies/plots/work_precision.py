@@ -9,11 +9,12 @@ from matplotlib.lines import Line2D
 from matplotlib.patheffects import withStroke
 
 from studies.base.counting import heading, readable
+from studies.exchange.entry import is_entry
 from studies.metrics.judged import DISPLACEMENT, FORCE, Judged, Measured, cheapest, front, judged, over_meshes
 from studies.metrics.metric import Metric
 from studies.metrics.run import Run, by_scene
 from studies.metrics.wish import usual_wish
-from studies.plots.style.families import PAPER, Family, family_of
+from studies.plots.style.families import OUTSIDE, PAPER, Family, family_of
 from studies.plots.style.page import blank, finish, log_axis, page, panels, remarks, unresolved_mark, unresolved_notes
 from studies.plots.style.style import BLACK, GREEN, GREY, SMALL, drawing, remark, styled
 from studies.runs.recipes import BodyRecipe
@@ -32,18 +33,25 @@ ROOM, BELOW, SIDE = 1.6, 3.0, 2.0
 """Factors between the outermost values and the ends of the axes: above, below (with room for a name), at the sides."""
 MOST_NAMED = 3
 """Most failed runs that a note names."""
+UNTIMED = (0, (6, 2))
+"""Line of a case whose time is unknown."""
 STARS = ("*", (4, 1, 0), (5, 1, 36))
 """Markers that have little area."""
 LOWEST, HIGHEST = 1e-3, 1e3
 """Errors outside these limits are drawn at them [%]."""
 
 
-@styled
 def figure(runs: Sequence[Run]) -> Figure:
     scenes = {name: _judged(group) for name, group in by_scene(runs).items()}
     scenes = {name: bodies for name, bodies in scenes.items() if bodies}
     if not scenes:
         return blank(TITLE, "no frame times from this machine and this code yet")
+    return figure_of(scenes, runs)
+
+
+@styled
+def figure_of(scenes: dict[str, list[Judged]], runs: Sequence[Run]) -> Figure:
+    """Cases by scene; runs: those that notes are about. A case without a time is a line at its error."""
     shown = [run for run in runs if run.case.scene.name in scenes]
     columns = min(COLUMNS, len(scenes))
     blocks = -(-len(scenes) // columns)
@@ -53,7 +61,9 @@ def figure(runs: Sequence[Run]) -> Figure:
         for row in (0, 1):
             axes[2 * (spare // columns) + row, spare % columns].set_axis_off()
     heights: list[list[float]] = [[] for _ in range(2 * blocks)]
-    low, high = _ends([one.cost.value for bodies in scenes.values() for one in bodies] + [REAL_TIME, HALF])
+    low, high = _ends(
+        [one.cost.value for group in scenes.values() for one in group if one.cost.known] + [REAL_TIME, HALF]
+    )
     for place, (name, bodies) in enumerate(scenes.items()):
         column = axes[2 * (place // columns) : 2 * (place // columns) + 2, place % columns]
         group = [run for run in shown if run.case.scene.name == name]
@@ -73,7 +83,7 @@ def figure(runs: Sequence[Run]) -> Figure:
 
 
 def _judged(group: Sequence[Run]) -> list[Judged]:
-    return [one for one in over_meshes(filter(None, map(judged, group))) if one.cost.known]
+    return [one for one in over_meshes(filter(None, map(judged, group))) if one.cost.known or is_entry(one.case)]
 
 
 def _ends(values: Sequence[float]) -> tuple[float, float]:
@@ -93,11 +103,16 @@ def _draw_scene(column: np.ndarray, bodies: Sequence[Judged], scene: Scene) -> l
             remark(panel, "no reference, no error" if not any(one.compared for one in bodies) else _why_not(metric))
             heights.append([])
             continue
-        _draw_front(panel, points)
-        for one, error in points:
-            _draw_point(panel, one, error, FIELDS[metric.name])
+        timed = [(one, error) for one, error in points if one.cost.known]
+        if timed:
+            _draw_front(panel, timed)
         heights.append([bound, *(_height(error) for _, error in points)])
-        _name(panel, points, recommended)
+        for one, error in points:
+            if one.cost.known:
+                _draw_point(panel, one, error, FIELDS[metric.name])
+            else:
+                panel.axhline(_height(error), color=family_of(one.case).colour, linewidth=1.6, linestyle=UNTIMED)
+        _name(panel, timed, recommended)
     return heights
 
 
@@ -150,7 +165,7 @@ def _draw_point(panel: Axes, one: Judged, error: Measured, field: str) -> None:
 
 
 def _size(look: Family) -> float:
-    return 11.0 if look.marker in STARS else 8.0
+    return 11.0 if look.marker in STARS or look.marker == OUTSIDE else 8.0
 
 
 def _name(panel: Axes, points: Sequence[tuple[Judged, Measured]], recommended: Judged | None) -> None:
@@ -159,6 +174,8 @@ def _name(panel: Axes, points: Sequence[tuple[Judged, Measured]], recommended: J
         one, error = max(papers, key=lambda pair: pair[0].cost.value)
         _write(panel, one, error, PAPER, "bottom")
     for one, error in points:
+        if is_entry(one.case):
+            _write(panel, one, error, one.case.method.name.replace("_", " "), "top")
         if one is recommended:
             # No point lies to the lower left of a point on the front.
             _write(panel, one, error, "recommended", "top")
@@ -210,19 +227,27 @@ def _left_out(runs: Sequence[Run]) -> list[str]:
         more = f" and {len(ended) - MOST_NAMED} more" if len(ended) > MOST_NAMED else ""
         notes.append(f"Not drawn, because they failed: {', '.join(ended[:MOST_NAMED])}{more}.")
     bodies = [one for group in by_scene(well).values() for one in over_meshes(filter(None, map(judged, group)))]
-    untimed = sum(not one.cost.known for one in bodies)  # of several neighbouring meshes only one is timed
+    untimed = sum(
+        not one.cost.known and not is_entry(one.case) for one in bodies
+    )  # of several neighbouring meshes only one is timed
     if untimed:
         notes.append(f"Not drawn (no frame times for this machine and code version): {untimed}.")
     return notes
 
 
 def _handles(scenes: dict[str, list[Judged]]) -> list[Line2D]:
-    looks = dict.fromkeys(family_of(one.case) for bodies in scenes.values() for one in bodies)
+    cases = [one for bodies in scenes.values() for one in bodies]
+    looks = dict.fromkeys(family_of(one.case) for one in cases if one.cost.known)
+    untimed = dict.fromkeys(family_of(one.case) for one in cases if not one.cost.known)
     plain = {"linestyle": "", "markeredgecolor": "white", "markeredgewidth": 0.5}
     return [
         *(
             Line2D([], [], color=look.colour, marker=look.marker, markersize=_size(look), label=look.name, **plain)
             for look in looks
+        ),
+        *(
+            Line2D([], [], color=look.colour, linewidth=1.6, linestyle=UNTIMED, label=f"{look.name}, no time given")
+            for look in untimed
         ),
         Line2D([], [], color=GREY, linewidth=1.2, label="best for the time"),
         Line2D([], [], color=BLACK, linewidth=1.4, label="real time"),

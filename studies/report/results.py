@@ -9,19 +9,24 @@ from typing import Any
 
 from studies.base.atomic import write_whole
 from studies.base.errors import StudyError
+from studies.catalog import STUDIES
 from studies.catalog.study import Study
 from studies.exchange.entry import FOLDER as SUBMISSIONS
 from studies.exchange.entry import entries_beside
+from studies.exchange.league import LEAGUE
 from studies.geometry import SHAPES, organ
 from studies.metrics.run import Run
 from studies.metrics.table import metric, study_table
+from studies.report.league import NAME as LEAGUE_NAME
 from studies.report.league import write_league
-from studies.report.page.part import read_part, write_part
-from studies.report.page.write import write_page
+from studies.report.page.entries import ENTRIES, refresh_entries
+from studies.report.page.part import read_part, run_id, write_part
+from studies.report.page.write import NAME, write_page
 from studies.report.references import refresh_uncertainty, state_of
 from studies.report.summary import SUMMARIES
 from studies.runs.paper import play, slide_case, squeezed_balls
 from studies.runs.user_code import fault_of, file_of
+from studies.scene.scene import Scene
 from studies.store.archived import is_archive, shown_machine
 from studies.store.ledger import Ledger
 from studies.store.machine import write_machine
@@ -80,9 +85,27 @@ def report(
         refreshed = [refresh(ledger, study) for study in drawn]
         written = [path for paths, _ in refreshed for path in paths]
         remarks = [sentence for _, sentences in refreshed for sentence in sentences]
+    pages, left_out = _pages(ledger, studies)
+    return [*written, *pages], [*remarks, *left_out]
+
+
+def report_entry(ledger: Ledger, run: Run, scene: Scene) -> tuple[Path, list[str]]:
+    """The page that shows an entry of another program, with all that was drawn last; and what is missing, in sentences.
+    scene: as it was found, with the plan of its reference."""
+    paths, remarks = _pages(ledger, STUDIES, [scene], run_id(run))
+    league = LEAGUE in run.record.attributes
+    return next(path for path in paths if path.name == (LEAGUE_NAME if league else NAME)), remarks
+
+
+def _pages(
+    ledger: Ledger, studies: Sequence[Study], scenes: Sequence[Scene] = (), shown: str | None = None
+) -> tuple[list[Path], list[str]]:
+    """Those of the league and of the entries, and report.html; none of what nothing is stored."""
     league, cards, unread = write_league(ledger.root)
-    page, left_out = write_page(ledger.root, studies, cards)
-    return [*written, *league, *([page] if page else [])], [*remarks, *unread, *left_out]
+    own = [scene for study in studies if study not in STUDIES for scene in study.scenes]
+    unreadable = refresh_entries(ledger, [*own, *scenes])
+    page, left_out = write_page(ledger.root, [*studies, ENTRIES], cards, shown)
+    return [*league, *([page] if page else [])], [*unread, *unreadable, *left_out]
 
 
 def charts_and_tables(ledger: Ledger, studies: Sequence[Study]) -> tuple[list[Path], list[str]]:

@@ -5,10 +5,9 @@ from typing import Annotated
 
 import typer
 
-from studies.catalog import STUDIES
 from studies.cli.terminal import Results, SceneName, busy, say, warn
 from studies.exchange.description import judged_metrics
-from studies.exchange.entry import entry_files
+from studies.exchange.entry import entry_files, sides_of
 from studies.exchange.judge import judge as judged
 from studies.exchange.judge import judged_path
 from studies.exchange.league import LEAGUE, check_entry, read_entry_file
@@ -16,7 +15,9 @@ from studies.exchange.meshes import NODES
 from studies.metrics.cells import UNRESOLVED_NOTE, plain, value_cell
 from studies.metrics.judged import FORCE
 from studies.metrics.run import Run
+from studies.report.results import report_entry
 from studies.scene.quantities import ALWAYS
+from studies.store.ledger import Ledger
 from studies.sweep.find_scene import find_scene
 
 REVERSED = -100.0
@@ -37,7 +38,7 @@ def judge(
     nodes: Annotated[int, typer.Option(help="vertices on the outer surface, as in the exported mesh")] = NODES,
     results: Results = Path("results"),
 ) -> None:
-    """Judge the results of another program like our own: positions, forces, times. Keep them with our results."""
+    """Judge the results of another program like our own: positions, forces, times. Write a page that shows them."""
     if file.suffix.lower() == ".json":
         check_entry(read_entry_file(file), scene)  # a scene that is held back is no scene here
     chosen_scene = find_scene(scene)
@@ -46,8 +47,7 @@ def judge(
         run = judged(chosen_scene, file, results, name=name, nodes=nodes, force=force, seconds=seconds)
     attributes, path = run.record.attributes, judged_path(results, run)
     if run.record.fields:
-        mesh = "the curved mesh" if run.case.body.kind == "quadratic" else "the straight mesh"
-        size = f"{attributes['nodes']} nodes of {mesh}, {attributes['frames']} steps"
+        size = f"{attributes['nodes']} nodes of the {sides_of(run.case)} mesh, {attributes['frames']} steps"
         say(f"{run.case.method.name}: {run.record.status}, {size}")
         for line in lines_of(run):
             say(line)
@@ -56,10 +56,11 @@ def judge(
         say(f"{run.case.method.name}: {run.record.status}, {run.record.message}")
     if path in before:
         warn([f"it replaces an entry named {run.case.method.name} on the same mesh"])
-    names = [study.name for study in STUDIES if chosen_scene.name in [each.name for each in study.scenes]]
-    command = "report" if LEAGUE in attributes else f"table {names[-1]}" if names else ""
-    shown = f", shown next to our methods by `organbench {command}`" if command else ""
-    say(f"stored in {path}{shown}")
+    say(f"stored in {path}")
+    with busy("drawing the page"):
+        page, remarks = report_entry(Ledger(results), run, chosen_scene)
+    warn(remarks)
+    say(f"{page}: next to the reference and our methods")
 
 
 def hints_of(run: Run) -> list[str]:

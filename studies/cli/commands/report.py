@@ -12,6 +12,7 @@ from studies.cli.terminal import PROGRAM, Results, busy, say, warn
 from studies.exchange.entry import entry_files
 from studies.metrics.table import check_columns
 from studies.report import results as reports
+from studies.report.page.write import NAME
 from studies.runs.current import case_path
 from studies.store.ledger import Ledger
 from studies.sweep.find_study import find_study
@@ -38,6 +39,8 @@ def report(
         written, remarks = reports.report(Ledger(results), [*STUDIES, *more], [*named.values()] or None)
     if figures:
         written += reports.draw_figures(results)
+    if not any(path.name == NAME for path in written):
+        raise StudyError(f"nothing is stored in {results}, so there is no page; run `organbench run volume_loss` first")
     warn(remarks)
     for path in written:
         say(path)

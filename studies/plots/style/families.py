@@ -64,6 +64,8 @@ CONTESTANTS: dict[tuple[str, str], Family] = {
     ("elastic_response", "quadratic"): Family("elastic response, precomputed", MUTED[9], (4, 0, 20)),
 }
 """Alternatives to mass-spring bodies: (method, kind of body) -> family."""
+OUTSIDE = "X"
+"""Marker of methods that are not ours."""
 OUR_METHODS = tuple(method.name for method in (*METHODS, *LITERATURE))
 WHOLE = "implicit_volume"
 """The method that a family does not name."""
@@ -85,6 +87,6 @@ def family_of(case: Case) -> Family:
         return family
     if family is not None and case.method.name not in OUR_METHODS:
         # An entry of another program, or a method of the user.
-        return Family(f"{case.method.name.replace('_', ' ')}, {body.kind}", method_colour(case.method.name), "X")
+        return Family(f"{case.method.name.replace('_', ' ')}, {body.kind}", method_colour(case.method.name), OUTSIDE)
     own = "" if case.method.name == WHOLE else f", {case.method.name.replace('_', ' ')}"
     return Family(f"{body.series}{own}", GREY, "X" if family is None else family.marker)

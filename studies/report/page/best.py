@@ -5,12 +5,18 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Any
 
 from studies.base.counting import counted, readable
+from studies.exchange.entry import sides_of
 from studies.meshing.bounds import SHAPE, SHAPE_VOLUME
 from studies.metrics.cells import MISSING, plain, value_cell
 from studies.metrics.judged import Judged, Measured, by_cost
 from studies.metrics.run import Run
+from studies.metrics.wish import Wish, usual_wish
 from studies.report.summary import PAPER, choice_of, compared_bodies, paper_body
+from studies.runs.case import Case
 from studies.runs.recipe_text import body_words
+from studies.scene.scene import Scene
+from studies.store.paths import key_hash
+from studies.store.record import Status
 from studies.tools.advise.words import wish_words
 
 Best = dict[str, Any]
@@ -21,26 +27,62 @@ HEADS = ("body, surface nodes, step / limit", "force [%]", "mean [%]", "shape [%
 SIGNED = ("force", "volume")
 SHAPE_WORDS = f"shape within {SHAPE:g} % of the organ's size, its volume within {SHAPE_VOLUME:g} %"
 """The bounds that `cheapest` adds to every wish."""
+MISSED = {"force": "force", "displacement": "displacement", "shape": "shape", "shape_volume": "volume of the shape"}
+"""Bounds of `Judged.shares` in words."""
+MISSES = "misses the target"
 SPEED, SPEED_FLOOR = "real_time [s/s]", "real_time floor [s/s]"
+
+
+def case_id(case: Case) -> str:
+    """The same for cases with the same numbers, independent of additional recorded fields."""
+    return key_hash(case.replaced(recorded=()).key)
 
 
 def best_bodies(runs: Sequence[Run], run_id: Callable[[Run], str]) -> list[Best]:
     """Of every scene in which an error of a body by implicit_volume is known: the cheapest body within the usual
     target, else the nearest."""
-    best, ids = [], {run.case.key: run_id(run) for run in runs}
-    for name, bodies in compared_bodies(runs).items():
-        choice, paper = choice_of(bodies[0].case.scene, bodies), paper_body(bodies)
-        if choice is None:
-            continue
-        wish, chosen, meets = choice
-        # Among studies: bodies within the target by their cost, others by how far they miss it.
-        order = [0.0, *map(float, by_cost(chosen))] if meets else [1.0, chosen.worst(wish)]
-        row = _row(chosen, ids) | {"scene": name, "target": f"{wish_words(wish)}, {SHAPE_WORDS}", "meets": meets}
-        best.append(row | {"order": order, "paper": None if paper is None else _row(paper, ids)})
-    return best
+    ids = {run.case.key: run_id(run) for run in runs}
+    rows = (_best(bodies, lambda one: ids[one.case.key]) for bodies in compared_bodies(runs).values())
+    return [row for row in rows if row is not None]
 
 
-def _row(one: Judged, ids: Mapping[str, str]) -> Best:
+def best_beside(
+    scene: Scene, others: Sequence[Judged], theirs: Mapping[Run, Judged | None], run_id: Callable[[Run], str]
+) -> Best:
+    """The best of `others`, cases of one scene, if there is any; and every entry of `theirs` with the number of others
+    that are nearer to the reference."""
+    wish, entries = usual_wish(scene), []
+    for run, one in theirs.items():
+        name = run.case.method.name
+        entry: Best = {"name": name, "case": run_id(run), "status": str(run.record.status), "others": len(others)}
+        if one is not None and one.compared:
+            entry |= _row(one, run_id(run), f"{name}, {sides_of(run.case)} mesh, {run.case.body.nodes}")
+            missed = [MISSED[name] for name, share in one.shares(wish).items() if share > 1.0]
+            entry |= {"meets": not missed, "missed": missed}
+            entry["nearer"] = sum(other.worst(wish) < one.worst(wish) for other in others)
+        entries.append(entry)
+    none = {"scene": scene.name, "target": _target(wish), "meets": False, "body": "", "paper": None, "order": [2.0]}
+    return (_best(others, lambda one: case_id(one.case)) or none) | {"entries": entries}
+
+
+def _target(wish: Wish) -> str:
+    return f"{wish_words(wish)}, {SHAPE_WORDS}"
+
+
+def _best(bodies: Sequence[Judged], id_of: Callable[[Judged], str]) -> Best | None:
+    scene = bodies[0].case.scene if bodies else None
+    choice = choice_of(scene, bodies) if scene else None
+    if scene is None or choice is None:
+        return None
+    wish, chosen, meets = choice
+    paper = paper_body(bodies)
+    # Among studies: bodies within the target by their cost, others by how far they miss it.
+    order = [0.0, *map(float, by_cost(chosen))] if meets else [1.0, chosen.worst(wish)]
+    row = _row(chosen, id_of(chosen)) | {"scene": scene.name, "target": _target(wish), "meets": meets}
+    return row | {"order": order, "paper": None if paper is None else _row(paper, id_of(paper))}
+
+
+def _row(one: Judged, number: str, words: str = "") -> Best:
     cost = one.cost
     speed = Measured(1 / cost.value, cost.uncertainty / cost.value**2) if cost.known else cost
     numbers = {"force": one.force, "displacement": one.displacement, "shape": one.shape, "volume": one.shape_volume}
@@ -51,8 +93,8 @@ def _row(one: Judged, ids: Mapping[str, str]) -> Best:
         else None
         for name, number in numbers.items()
     }
-    words = f"{body_words(one.case.body)}, {one.case.dt_fraction:g}"
-    return {"body": words, "case": ids[one.case.key], "meshes": max(1, len(one.members)), **pairs}
+    words = words or f"{body_words(one.case.body)}, {one.case.dt_fraction:g}"
+    return {"body": words, "case": number, "meshes": max(1, len(one.members)), **pairs}
 
 
 def joined_best(parts: Sequence[Sequence[Best]], rows: Sequence[Mapping[str, Any]]) -> list[Best]:
@@ -66,31 +108,49 @@ def joined_best(parts: Sequence[Sequence[Best]], rows: Sequence[Mapping[str, Any
     for group in scenes.values():
         chosen = min(group, key=lambda row: row["order"])
         paper = next((row["paper"] for row in group if row["paper"]), None)
-        best.append(_timed(chosen, speeds) | {"paper": _timed(paper, speeds) if paper else None})
+        entries = [entry for row in group for entry in row.get("entries", ())]
+        best.append(_timed(chosen, speeds) | {"paper": _timed(paper, speeds) if paper else None, "entries": entries})
     return best
 
 
 def _timed(row: Best, speeds: Mapping[str, list[float]]) -> Best:
-    return row | {"speed": row["speed"] or speeds.get(row["case"])}
+    return row | {"speed": row["speed"] or speeds.get(row["case"])} if row["body"] else row
 
 
 def own_first(best: Sequence[Best], own: Collection[str]) -> list[Best]:
     return sorted(best, key=lambda row: row["scene"] not in own)
 
 
-def answers(best: Sequence[Best], own: Collection[str] = ()) -> dict[str, str]:
+def answers(best: Sequence[Best], own: Collection[str] = (), shown: str | None = None) -> dict[str, str]:
     """Three questions and their answers, for the scenes in `own` where a body is judged in one of them; nothing where
-    none is. First of all what is missing from the shape of a body."""
-    best = [row for row in best if row["scene"] in own] or best
+    none is. First of all what is missing from the shape of a body, and how near an entry is whose case is `shown`."""
+    entries = [(row, entry) for row in best for entry in row.get("entries", ()) if entry["case"] == shown]
+    theirs = {f"How near is {entry['name']}?": _near(row, entry) for row, entry in entries}
+    bodies = [row for row in best if row["body"]]
+    best = [row for row in bodies if row["scene"] in own] or bodies
     if not best:
-        return {}
+        return theirs
     papers = [row["paper"] for row in best if row["paper"]]
     lost = "; ".join(words for row in best if (words := _missing(row)))
-    return ({"What is missing?": f"{lost}: use more nodes."} if lost else {}) | {
-        "Which body?": _which(best),
-        "How wrong?": f"{_capital(_errors(best))}{_meshes(best)}.{_beside(_errors(papers))}",
-        "How fast?": f"{_capital(_speed(best) or 'no time is measured')}.{_beside(_speed(papers))}",
-    }
+    return (
+        ({"What is missing?": f"{lost}: use more nodes."} if lost else {})
+        | theirs
+        | {
+            "Which body?": _which(best),
+            "How wrong?": f"{_capital(_errors(best))}{_meshes(best)}.{_beside(_errors(papers))}",
+            "How fast?": f"{_capital(_speed(best) or 'no time is measured')}.{_beside(_speed(papers))}",
+        }
+    )
+
+
+def _near(row: Best, entry: Best) -> str:
+    where = f"In {readable(row['scene'])}"
+    if "body" not in entry:
+        ended = "the scene compares none of its errors" if entry["status"] == Status.OK else f"it is {entry['status']}"
+        return f"{where} {ended}."
+    verdict = "meets the target" if entry["meets"] else f"misses the target in {' and '.join(entry['missed'])}"
+    rank = f" {entry['nearer']} of {counted(entry['others'], 'other case')} are nearer." if entry["others"] else ""
+    return f"{where}: {_errors([entry])}. It {verdict} ({row['target']}).{rank}"
 
 
 def _missing(row: Best) -> str:
@@ -163,11 +223,16 @@ def _span(rows: Sequence[Best], name: str) -> str:
 
 
 def scene_rows(best: Sequence[Best]) -> list[dict[str, Any]]:
-    return [
-        {"scene": readable(row["scene"]), "meets": row["meets"], "best": _cells(row)}
-        | {"paper": _cells(row["paper"]) if row["paper"] else None}
-        for row in best
-    ]
+    """Of each scene the cells of the best body, those of entries, and those of the paper's body, with their marks."""
+    return [{"scene": readable(row["scene"]), "rows": _scene_cells(row)} for row in best]
+
+
+def _scene_cells(row: Best) -> list[dict[str, Any]]:
+    best = [_cells(row) | {"mark": "" if row["meets"] else MISSES, "soft": False}] if row["body"] else []
+    theirs = [entry for entry in row.get("entries", ()) if "body" in entry]
+    entries = [_cells(entry) | {"mark": "" if entry["meets"] else MISSES, "soft": False} for entry in theirs]
+    paper = [_cells(row["paper"]) | {"mark": "the paper’s", "soft": True}] if row["paper"] else []
+    return [*best, *entries, *paper]
 
 
 def _cells(row: Best) -> dict[str, Any]:

@@ -9,7 +9,7 @@ import numpy as np
 
 from massspring import Capsule, Obstacle, Plane
 from studies.base.counting import readable
-from studies.exchange.entry import ENTRY
+from studies.exchange.entry import ENTRY, SECONDS, sides_of
 from studies.metrics.metric import PERCENT
 from studies.metrics.run import Run
 from studies.report.page.pack import STEP, pack_frames, pack_indices, pack_series
@@ -191,15 +191,16 @@ def entry_data(run: Run, scene: str) -> dict[str, Any]:
     all entries hold on one of the scene's own meshes; one that handed nothing in has none. `scene`: as the command line
     takes it."""
     case, record, name = run.case, run.record, run.case.method.name
-    mesh = "curved" if case.body.kind == "quadratic" else "straight"
     outcome = record.status if record.status == Status.OK else f"{record.status} ({record.message})"
     file = str(record.attributes[ENTRY]).split(" sha256:")[0]
+    again = f"organbench judge {scene} {file if record.fields else 'FILE'} --name {name}"
+    seconds = record.attributes.get(SECONDS)
     data = {
-        "title": f"{readable(case.scene.name)} · entry {name}, {mesh} mesh, {case.body.nodes} nodes",
+        "title": f"{readable(case.scene.name)} · entry {name}, {sides_of(case)} mesh, {case.body.nodes} nodes",
         "entry": name,
         "scene": case.scene.name,
         "about": f"{case.scene.title}. Computed by another program and judged like our own runs; it ended {outcome}.",
-        "again": f"organbench judge {scene} {file if record.fields else 'FILE'} --name {name}",
+        "again": again if seconds is None else f"{again} --seconds {seconds:g}",
         "duration": case.scene.duration,
         # Its computing time is a single number, which is in the table.
         "histories": {what: values for what, values in histories(run).items() if what != "frame"},

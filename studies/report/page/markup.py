@@ -36,6 +36,8 @@ SIGNED = ("force_end", "shape_volume")
 AFTER = {"nodes": "nodes", "dt/dt_c": "step / limit", "law": "law", "status": "status", "study": "study"}
 """Columns behind the metrics, and their heads."""
 NUMBERS = ("nodes", "dt/dt_c")
+NEAR = "largest share of a target [1]"
+"""Column of entries and of the published rows beside them, by which these are in order."""
 JUDGED = ("force_end", "mean_error", "real_time")
 """Rows with one of these come before rows without: a stability map has hundreds of those."""
 
@@ -82,7 +84,8 @@ def table(rows: Sequence[Mapping[str, Any]], cases: Mapping[str, Any]) -> Entry:
     heads += [(words, "number" if name in NUMBERS else "text", "") for name, words in AFTER.items()]
     judged = [metrics[name] for name in JUDGED if name in metrics]
     entries = []
-    for row in sorted(rows, key=lambda row: all(_value(row, metric) is None for metric in judged)):
+    order = lambda row: (all(_value(row, metric) is None for metric in judged), row.get(NEAR) or 0.0)  # noqa: E731
+    for row in sorted(rows, key=order):
         cells = [_metric_cell(row, metrics[name]) for name in columns]
         cells += [_word_cell(row.get(name), name) for name in AFTER]
         entries.append(_names(row, cases) | {"cells": cells})
@@ -93,7 +96,7 @@ def _names(row: Mapping[str, Any], cases: Mapping[str, Any]) -> Entry:
     """Scene, body and method; marks: an entry from outside, a reference that is far from the shape, a run that did
     not end well."""
     case = cases.get(row["case"])
-    marks = ["entry"] if row.get("entry") else []
+    marks = [mark for mark in ("entry", "published") if row.get(mark)]
     off = row.get(OFF_SHAPE)
     marks += [f"reference {off:.2g} % off the shape"] if off is not None and off > REFERENCE_SHAPE else []
     return {
@@ -101,6 +104,7 @@ def _names(row: Mapping[str, Any], cases: Mapping[str, Any]) -> Entry:
         "title": None if case is None else case["title"],
         "scene": readable(row["scene"]),
         "marks": [*marks, row["status"]] if row["status"] != "ok" else marks,
+        "theirs": bool(row.get("entry")),
         "lines": (f"{row['body']}, {row['nodes']} nodes", marked(row)),
         "order": f"{row['scene']} {row['body']} {row['nodes']} {row['method']}",
     }

@@ -16,11 +16,12 @@ from studies.base.atomic import write_whole
 from studies.catalog.study import RESERVED, Study, command_line, word_elsewhere
 from studies.exchange.entry import is_entry
 from studies.metrics.run import Run
-from studies.report.page.best import best_bodies
+from studies.report.page.best import Best, best_bodies, case_id
 from studies.report.page.case_data import case_data, entry_data
 from studies.report.page.reference_shape import reference_id, reference_shape
 from studies.runs.current import case_path
 from studies.runs.user_code import files_of
+from studies.scene.library import CUT, SCENES
 from studies.store.paths import key_hash, record_files
 
 Part = dict[str, Any]
@@ -40,11 +41,20 @@ def part_path(root: Path, study: Study) -> Path:
     return root / "cache" / f"{study.name}.page.json"
 
 
-def write_part(root: Path, study: Study, runs: Sequence[Run], table: pd.DataFrame, pictures: Mapping[str, str]) -> None:
+def write_part(
+    root: Path,
+    study: Study,
+    runs: Sequence[Run],
+    table: pd.DataFrame,
+    pictures: Mapping[str, str],
+    published: Sequence[Mapping[str, Any]] = (),
+    best: Sequence[Best] | None = None,
+) -> None:
     """Gathers and keeps the part of a study and of the entries from outside in its scenes; `table` has a row for each
-    of `runs`, `pictures` its charts as SVG by the names of their files."""
+    of `runs`, `pictures` its charts as SVG by the names of their files. published: further rows, which have no case on
+    the page; best: by default that of `runs`."""
     ids = [run_id(run) for run in runs]
-    rows = [{name: _plain(value) for name, value in row.items()} for row in table.to_dict("records")]
+    rows = [{name: _plain(value) for name, value in row.items()} for row in (*table.to_dict("records"), *published)]
     cases: dict[str, Any] = {}
     references: dict[str, Any] = {}
     for number, run in zip(ids, runs, strict=True):
@@ -59,10 +69,12 @@ def write_part(root: Path, study: Study, runs: Sequence[Run], table: pd.DataFram
         if name not in pictures
     ]
     theirs = [is_entry(run.case) for run in runs]
-    rows = [{**row, "case": n, "entry": entry} for row, n, entry in zip(rows, ids, theirs, strict=True)]
+    for row, n, entry in zip(rows, ids, theirs, strict=False):  # published rows have their own
+        row |= {"case": n, "entry": entry}
     about = {name: getattr(study, name) for name in ABOUT}
     part: Part = {"study": about, "rows": rows, "cases": cases, "references": references, "charts": charts}
-    part |= {"remarks": remarks, "best": best_bodies([run for run in runs if not is_entry(run.case)], run_id)}
+    chosen = best_bodies([run for run in runs if not is_entry(run.case)], run_id) if best is None else [*best]
+    part |= {"remarks": remarks, "best": chosen}
     content = json.dumps(part, allow_nan=False).encode()
     write_whole(part_path(root, study), _digest(content) + b"\n" + content)
 
@@ -121,13 +133,15 @@ def _data(root: Path, study: Study, run: Run) -> dict[str, Any]:
 
 def _scene_word(study: Study, scene: str) -> str:
     """A scene as the command line takes it: of a study of the user's with the file, in which several may be."""
-    return shlex.quote(f"{word_elsewhere(study)}:{scene}") if study.word.endswith(".py") else scene
+    if study.word.endswith(".py"):
+        return shlex.quote(f"{word_elsewhere(study)}:{scene}")
+    return scene if scene in [each.name for each in (*SCENES, *CUT)] else f"FILE.py:{scene}"
 
 
 def run_id(run: Run) -> str:
     """An id that is the same for runs with the same numbers, independent of additional recorded fields; for an entry
     the same in all studies with its scene."""
-    return key_hash(run.record.key if is_entry(run.case) else run.case.replaced(recorded=()).key)
+    return key_hash(run.record.key) if is_entry(run.case) else case_id(run.case)
 
 
 def _named(root: Path, path: Path) -> Path:

@@ -17,7 +17,7 @@ from markupsafe import Markup
 from studies.base.atomic import write_whole
 from studies.base.counting import counted
 from studies.base.errors import StudyError
-from studies.catalog.study import Study, command_line
+from studies.catalog.study import RESERVED, Study, command_line
 from studies.report.page.best import HEADS, answers, joined_best, own_first, scene_rows
 from studies.report.page.case_data import merged
 from studies.report.page.markup import ASSETS, TEMPLATES, machine_words, script_json, table, tabs
@@ -53,11 +53,12 @@ class Page:
 
 
 def write_page(
-    root: Path, studies: Sequence[Study], league: Sequence[Mapping[str, Any]] = ()
+    root: Path, studies: Sequence[Study], league: Sequence[Mapping[str, Any]] = (), shown: str | None = None
 ) -> tuple[Path | None, list[str]]:
     """Writes the page and its folder from the stored parts (studies.report.page.part) of `studies` and of others in
     `root`. Returns its path, None if nothing is stored, and sentences on parts that could not be drawn or are older.
-    league: the cards of its engines. Raises StudyError when something cannot be written."""
+    league: the cards of its engines; shown: the id of the case that is shown at first. Raises StudyError when something
+    cannot be written."""
     others, remarks = other_studies(root, studies)
     parts = []
     for study in (*studies, *others):
@@ -69,7 +70,7 @@ def write_page(
             remarks += [f"report.html: {remark}" for remark in part["remarks"]]
     if not parts:
         return None, remarks
-    page, more = fitting(parts, _machine(root), league, results_option(root))
+    page, more = fitting(parts, _machine(root), league, results_option(root), shown)
     for name, content in page.files.items():
         write_whole(root / FOLDER / name, content)
     write_whole(root / NAME, page.content)
@@ -103,8 +104,12 @@ def joined_cases(parts: Sequence[Part]) -> dict[str, Any]:
 
 
 def joined_rows(rows: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
+    """One row for each case of several studies, with the data of all; a published one only where the case has no
+    other."""
     by_case: dict[str, dict[str, Any]] = {}
-    for row in rows:
+    for row in sorted(rows, key=lambda row: bool(row.get("published"))):
+        if row.get("published") and row["case"] in by_case:
+            continue
         one = by_case.setdefault(row["case"], {**row, "study": ""})
         one |= {name: value for name, value in row.items() if one.get(name) is None}
         one["study"] = ", ".join(filter(None, (one["study"], row["study"])))
@@ -112,12 +117,16 @@ def joined_rows(rows: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
 
 
 def fitting(
-    parts: Parts, machine: dict[str, Any], league: Sequence[Mapping[str, Any]] = (), options: Sequence[str] = ()
+    parts: Parts,
+    machine: dict[str, Any],
+    league: Sequence[Mapping[str, Any]] = (),
+    options: Sequence[str] = (),
+    shown: str | None = None,
 ) -> tuple[Page, list[str]]:
     """The page with as many cases as LIMIT has room for, the first one and those with the most to see before others;
     a sentence where even without cases it is larger."""
     cases = joined_cases([part for _, part in parts])
-    first = first_case(cases)
+    first = shown if shown in cases else first_case(cases)
     data = {"cases": _heads(cases), "first": first, "folder": FOLDER, "pieces": {}}
     room, files = LIMIT - len(page(parts, data, machine, league, options)), {}
     for name, piece in _pieces(parts, cases, first).items():
@@ -169,28 +178,30 @@ def page(
     """The file. data: what its script reads; options: of the commands that make it again."""
     rows = [{"study": study.name, **row} for study, part in parts for row in part["rows"]]
     case_rows = joined_rows(rows)
-    names = [study.name for study, _ in parts]
     script = "\n".join((ASSETS / name).read_text(encoding="utf-8") for name in SCRIPTS)
-    studies = [study for study, _ in parts]
+    studies = [study for study, _ in parts if study.name not in RESERVED]
     # A study named by a FILE, and its scenes, are the user's.
     own = {row["scene"] for study, part in parts if study.word for row in part["best"]}
-    best = own_first(joined_best([part["best"] for _, part in parts], case_rows), own)
+    theirs = {row["scene"] for _, part in parts for row in part["best"] if row.get("entries")}
+    best = own_first(joined_best([part["best"] for _, part in parts], case_rows), own | theirs)
     text = TEMPLATES.get_template("page.html").render(
         style=Markup((ASSETS / "page.css").read_text(encoding="utf-8")),
-        summary=f"{_counted(case_rows)} of {counted(len(parts), 'study', 'studies')}: {', '.join(names)}. "
+        summary=f"{_counted(case_rows)}{_named(studies)}. "
         "Volume-preserving mass-spring organs against nearly incompressible finite elements.",
-        answers=answers(best, own),
+        answers=answers(best, own, data["first"]),
         best_heads=HEADS,
         best_rows=scene_rows(best),
+        shown=data["cases"],
         tabs=tabs(
             {study.name: part["charts"] for study, part in parts},
-            {study.name: " ".join(study.question.split()) for study in studies},
+            {study.name: " ".join(study.question.split()) for study, _ in parts},
         ),
         cases=table(case_rows, data["cases"]),
         count=counted(len(case_rows), "case"),
         csv=base64.b64encode(csv_of(rows).encode()).decode("ascii"),
         commands=[
-            command_line("run", studies, *options, elsewhere=True),
+            *([command_line("run", studies, *options, elsewhere=True)] if studies else ()),
+            *(" ".join([case["again"], *options]) for case in data["cases"].values() if "entry" in case),
             command_line("report", [study for study in studies if study.word], *options, elsewhere=True),
         ],
         machine=machine_words(machine),
@@ -202,10 +213,17 @@ def page(
     return text.encode()
 
 
+def _named(studies: Sequence[Study]) -> str:
+    names = ", ".join(study.name for study in studies)
+    return f"; {counted(len(studies), 'study', 'studies')}: {names}" if studies else ""
+
+
 def _counted(rows: Sequence[dict[str, Any]]) -> str:
-    theirs = sum(bool(row.get("entry")) for row in rows)
-    entries = f", among them {counted(theirs, 'entry', 'entries')} of other programs," if theirs else ""
-    return f"{counted(len(rows), 'case')}{entries}"
+    theirs, published = (sum(bool(row.get(name)) for row in rows) for name in ("entry", "published"))
+    kinds = [counted(theirs, "entry", "entries") + " of other programs"] if theirs else []
+    kinds += [counted(published, "published case")] if published else []
+    among = f", among them {' and '.join(kinds)}" if kinds else ""
+    return f"{counted(len(rows), 'case')}{among}"
 
 
 def first_case(cases: dict[str, Any]) -> str | None:

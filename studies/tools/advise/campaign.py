@@ -26,6 +26,7 @@ from studies.sweep.load import load_runs
 PUBLISHED = "published"
 """Folder below the results with tables that come with the repository."""
 COST = "real_time [s/s]"
+Row = dict[Any, Any]
 PACKAGE = Path(studies.__file__).parent
 
 
@@ -77,8 +78,8 @@ def shipped() -> Path:
     return PACKAGE if (PACKAGE / PUBLISHED).is_dir() else PACKAGE.parent / "results"
 
 
-def _table(published: Path) -> Path:
-    return published / ACCURACY.name / f"{ACCURACY.name}.csv"
+def _table(published: Path, study: str = ACCURACY.name) -> Path:
+    return published / study / f"{study}.csv"
 
 
 def stored_of_user(results: Path, scene: Scene) -> Stored | None:
@@ -103,15 +104,23 @@ def _runs(results: Path, study: Study, scene: Scene) -> tuple[list[Judged], set[
 
 
 def published_rows(published: Path, scene: Scene) -> list[Judged]:
-    """Rows of the table in a folder of published results. Raises StudyError for a table without complete recipes."""
-    path = _table(published)
+    """Rows of the table of the campaign in a folder of published results that ended well. Raises StudyError for a table
+    without complete recipes."""
+    return [one for row, one in published_table(published, scene) if row["status"] == Status.OK]
+
+
+def published_table(published: Path, scene: Scene, study: str = ACCURACY.name) -> list[tuple[Row, Judged]]:
+    """The rows of a scene in a table of a folder of published results, each also as a case, whether it ended well or
+    not. Raises StudyError for a table without complete recipes."""
+    path = _table(published, study)
     if not path.is_file():
         return []
     try:
         rows = pd.read_csv(path)
-        here = machine_of(published, ACCURACY.name) == machine_id()
-        chosen = rows.loc[(rows["scene"] == scene.name) & (rows["status"] == Status.OK)]
-        return [_judged_row(scene, row, here) for row in chosen.to_dict("records")]
+        here, rows["status"] = machine_of(published, study) == machine_id(), rows["status"].map(Status)
+        return [
+            (row, _judged_row(scene, row, here)) for row in rows.loc[rows["scene"] == scene.name].to_dict("records")
+        ]
     except (KeyError, ValueError, OSError) as error:
         if isinstance(error, StudyError):
             raise
@@ -120,13 +129,13 @@ def published_rows(published: Path, scene: Scene) -> list[Judged]:
         ) from error
 
 
-def _judged_row(scene: Scene, row: dict[Any, Any], here: bool) -> Judged:
+def _judged_row(scene: Scene, row: Row, here: bool) -> Judged:
     case: Case = case_of_recipe(scene, row["recipe"])
     cost = Measured(1.0 / float(row[COST]) if float(row.get(COST, "nan")) > 0 else float("nan"))
     force, displacement, shape, volume = (_of(row, entry) for entry in (FORCE, DISPLACEMENT, DISTANCE, VOLUME))
     return Judged(case, force, displacement, cost, 1e-3 * float(row["dt [ms]"]), here, shape, volume)
 
 
-def _of(row: dict[Any, Any], metric: Metric) -> Measured:
+def _of(row: Row, metric: Metric) -> Measured:
     name, unit = metric.name, metric.unit
     return Measured(float(row.get(f"{name} [{unit}]", "nan")), float(row.get(f"{name} floor [{unit}]", "nan")))

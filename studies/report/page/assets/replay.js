@@ -171,7 +171,11 @@ async function choose(id) {
   state.id = id;
   byId("chosen").value = id;
   document.querySelectorAll("#cases tr.chosen").forEach((row) => row.classList.remove("chosen"));
-  document.querySelectorAll(`#cases a[href="#case=${id}"]`).forEach((link) => link.closest("tr").classList.add("chosen"));
+  document.querySelectorAll(`#cases a[href="#case=${id}"]`).forEach((link) => {
+    const row = link.closest("tr"), frame = row.closest(".scroll");
+    row.classList.add("chosen");
+    frame.scrollTop = row.offsetTop - (frame.clientHeight - row.offsetHeight) / 2; // between its neighbours
+  });
   tellAbout(head);
   const absent = { histories: {}, why: `Histories and replay of this case are in ${DATA.folder}/case-${id}.js next to this page, but that file is missing. Copy the folder along with the page.` };
   const given = { ...head, ...(await piece(`case-${id}`) ?? absent) };
