@@ -61,6 +61,8 @@ class History:
     """Of each frame, (F,) int64; 0 after an early end."""
     frame_ns: np.ndarray
     """Wall time of each frame's steps [ns], (F,); 0 after an early end."""
+    cpu_ns: np.ndarray
+    """Processor time of this thread over the same spans [ns], (F,): shorter where the thread had to wait."""
     outcome: str
     """"finished", "diverged", "blocked" (a thin probe met tissue that had nowhere to go) or "timed-out"."""
     good_frames: int
@@ -173,7 +175,7 @@ class Recorder:
         self.contact_force = np.full((frames, len(obstacles), 3), np.nan)
         self.penetration = np.full((frames, len(obstacles)), np.nan)
         self.held_force = np.full((frames, attachments, 3), np.nan)
-        self.steps, self.frame_ns = np.zeros(frames, dtype=np.int64), np.zeros(frames, dtype=np.int64)
+        self.steps, self.frame_ns, self.cpu_ns = (np.zeros(frames, dtype=np.int64) for _ in range(3))
         self.keep = keep
         self.kept: dict[int, np.ndarray] = {}
         self.final = body.rest
@@ -181,9 +183,9 @@ class Recorder:
         self.limited = 0
         self.passages: list[Passage] = []
 
-    def record(self, frame: int, state: State, steps: int, elapsed_ns: int, numbers: Numbers | None = None) -> None:
-        """Records the state after frame number `frame` (0, 1, …) of so many `steps`; `numbers` maps to it from the last
-        body, None after the last event."""
+    def record(self, frame: int, state: State, steps: int, ns: tuple[int, int], numbers: Numbers | None = None) -> None:
+        """Records the state after frame number `frame` (0, 1, …) of so many `steps`, which took so many `ns` of wall
+        and of processor time; `numbers` maps to it from the last body, None after the last event."""
         x = state.x.astype(np.float64, copy=False)
         x = x if numbers is None else numbers.carried(x)
         self.volume[frame] = self.volumes.measure(x)
@@ -194,7 +196,7 @@ class Recorder:
         self.held_force[frame] = self._at_end(done.held_impulse, done.earlier_held, steps)
         for o, obstacle in enumerate(self.obstacles):
             self.penetration[frame, o] = max(0.0, self._depth(frame, o, obstacle, x))
-        self.steps[frame], self.frame_ns[frame] = steps, elapsed_ns
+        self.steps[frame], (self.frame_ns[frame], self.cpu_ns[frame]) = steps, ns
         self.singular += int(state.diagnostics.singular[0])
         self.limited += int(state.diagnostics.limited[0])
         self.iterations[frame] = state.diagnostics.iterations
@@ -269,6 +271,7 @@ class Recorder:
             final=self.final,
             steps=self.steps,
             frame_ns=self.frame_ns,
+            cpu_ns=self.cpu_ns,
             outcome=outcome,
             good_frames=good_frames,
             message=message,

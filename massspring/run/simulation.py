@@ -61,9 +61,9 @@ def simulate(
         reason = check_loads(boundary)
         if reason is not None:
             return recorder.stopped(frame, "diverged", reason)
-        begin = perf_counter_ns()
+        own, begin = thread_time_ns(), perf_counter_ns()
         state, steps = loaded.advanced(now, state, frame, boundary)
-        elapsed = perf_counter_ns() - begin
+        taken = perf_counter_ns() - begin, thread_time_ns() - own
         reason = check_state(state, now.setup.body)
         if reason is not None:
             return recorder.stopped(frame, "diverged", reason)
@@ -71,7 +71,7 @@ def simulate(
         if reason is not None:
             return recorder.stopped(frame, "blocked", reason)
         account.add(state, steps)
-        recorder.record(frame, state, steps, elapsed, now.last)
+        recorder.record(frame, state, steps, taken, now.last)
         recorder.record_energy(frame, account)
         if setup.events:
             recorder.record_targets(frame, now.targets_after(frame), now.last)

@@ -148,6 +148,7 @@ ACCURACY = Study(
         "shape_error",
         "shape_volume",
         "real_time",
+        "real_time_cpu",
         "step_time",
         "force_error",
         "surface_error",

@@ -83,6 +83,7 @@ CUTTING = Study(
         "cut_ms",
         "min_j",
         "real_time",
+        "real_time_cpu",
     ),
     expects=(Status.INVERTED,),  # stomach_opened, springs with one volume
 )

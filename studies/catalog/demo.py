@@ -21,7 +21,7 @@ DEMO = Study(
         Chart("squeeze.png", "studies.plots.squeeze:draw"),
         Chart("force.png", "studies.plots.force_path:draw"),
     ),
-    columns=("volume_worst", "force_end", "shape_error", "shape_volume", "real_time"),
+    columns=("volume_worst", "force_end", "shape_error", "shape_volume", "real_time", "real_time_cpu"),
 )
 WORDS = ("springs alone", "one kept volume", "recommended body")
 """What each case is called on the terminal."""

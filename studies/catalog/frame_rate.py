@@ -26,6 +26,6 @@ FRAME_RATE = Study(
         Chart("frame_time.png", "studies.plots.frame_time:draw"),
         Chart("cost_ratio.png", "studies.plots.cost_ratio:draw"),
     ),
-    columns=("step_time", "frame_time", "frame_time_p99", "real_time", "volume_worst"),
+    columns=("step_time", "frame_time", "frame_cpu", "frame_time_p99", "real_time", "real_time_cpu", "volume_worst"),
     main=True,
 )

@@ -50,6 +50,7 @@ LITERATURE_STUDY = Study(
         "shape_error",
         "shape_volume",
         "real_time",
+        "real_time_cpu",
         "step_time",
         "volume_worst",
         "min_j",

@@ -88,6 +88,8 @@ METHODS_STUDY = Study(
         "j_spread",
         "step_time",
         "frame_time",
+        "frame_cpu",
         "real_time",
+        "real_time_cpu",
     ),
 )

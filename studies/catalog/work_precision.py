@@ -31,6 +31,7 @@ WORK_PRECISION = Study(
         "shape_error",
         "shape_volume",
         "real_time",
+        "real_time_cpu",
         "step_time",
         "interior_error",
         "silhouette_error",

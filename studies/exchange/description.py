@@ -17,7 +17,7 @@ from studies.scene.scene import Scene
 SCHEMA, VERSION = "organbench-scene", 1
 """VERSION increases when a reader of the old format would misread the new one."""
 OURS = (
-    *("alternation", "step_time", "frame_time", "frame_time_p99"),
+    *("alternation", "step_time", "frame_time", "frame_time_p99", "frame_cpu", "real_time_cpu"),
     *("cut_energy", "cut_momentum", "cut_limit", "cut_ms"),
 )
 """Metrics that only apply inside this program."""

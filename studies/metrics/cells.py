@@ -10,6 +10,8 @@ UNRESOLVED_MARK = "†"
 UNRESOLVED_NOTE = f"{UNRESOLVED_MARK} unresolved: the uncertainty of the reference is more than a tenth of this error"
 FEW_MARK = "‡"
 FEW_NOTE = f"{FEW_MARK} a sphere or capsule touches fewer than {FEW} facets: its force may be off by tens of percent"
+DISTURBED_MARK = "¶"
+DISTURBED_NOTE = f"{DISTURBED_MARK} other programs disturbed the timing: its times may be too long, and have no ±"
 UNCONVERGED_MARK = "§"
 """Mark of a method without `Capabilities.converged`."""
 UNCONVERGED_NOTE = (

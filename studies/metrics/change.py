@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 
 from studies.metrics.metrics import METRICS
+from studies.metrics.table import DISTURBED
 from studies.scene.quantities import ALWAYS
 from studies.store.record import Record
 
@@ -126,6 +127,8 @@ def row_changes(case: Named, old: Row, new: Row, same_bits: bool = False) -> Ite
         floor = max(floor_of(old, name, named["unit"]), floor_of(new, name, named["unit"]))
         if name not in JUDGED and name not in TIMES:
             floor = SMALLEST
+        if name in TIMES and any(pd.notna(why := row.get(DISTURBED)) and why for row in (old, new)):
+            floor = np.nan
         verdict = verdict_of(before, after, floor, same_bits)
         if name in TIMES and verdict == Verdict.MOVED and np.isnan(after):
             verdict = Verdict.NOT_RESOLVABLE  # that it was not timed moves nothing

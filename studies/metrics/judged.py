@@ -10,6 +10,7 @@ from massspring import ImplicitVolume
 from studies.meshing.bounds import SHAPE, SHAPE_VOLUME
 from studies.metrics.run import Run
 from studies.metrics.table import metric
+from studies.metrics.timing.protocol import FrameTiming
 from studies.metrics.wish import Wish
 from studies.runs.case import Case
 from studies.runs.recipes import BodyRecipe, TetrahedralBody, neighbours
@@ -49,6 +50,12 @@ class Judged:
     """Time step [s]."""
     timed_here: bool = False
     """Whether the cost was measured on this machine."""
+    processor_cost: Measured = UNKNOWN
+    """As `cost`, of processor time."""
+    disturbed: str = ""
+    """What disturbed the timing (FrameTiming.disturbed)."""
+    processor: str = ""
+    """Name of the processor that the cost is of; empty where it is not known."""
     shape: Measured = UNKNOWN
     """shape_error [%]; unknown in tables of older code."""
     shape_volume: Measured = UNKNOWN
@@ -101,9 +108,9 @@ def judged(run: Run) -> Judged | None:
     if run.record.status != Status.OK:
         return None
     force, displacement = (Measured(entry(run), entry.uncertainty(run)) for entry in (FORCE, DISPLACEMENT))
-    dt, timed = float(run.attributes.dt), run.timing is not None
     shape, volume = Measured(DISTANCE(run)), Measured(VOLUME(run))
-    return Judged(run.case, force, displacement, cost_of(run), dt, timed, shape, volume)
+    one = Judged(run.case, force, displacement, dt=float(run.attributes.dt), shape=shape, shape_volume=volume)
+    return one if run.timing is None else with_times(one, run.timing, float(run.attributes.frame))
 
 
 def over_meshes(rows: Iterable[Judged]) -> list[Judged]:
@@ -141,16 +148,23 @@ def cost_of(run: Run) -> Measured:
     """Computing time over simulated time [1], and half the range over the repeats."""
     if run.timing is None:
         return UNKNOWN
-    return cost_of_frames(run.timing.frame_ns, float(run.attributes.frame))
+    return _cost(run.timing, run.timing.frame_ns, float(run.attributes.frame))
 
 
-def cost_of_frames(frame_ns: np.ndarray, frame: float) -> Measured:
-    """The median frame over its simulated time [1], and half the range of that over the repeats.
+def with_times(one: Judged, timing: FrameTiming, frame: float) -> Judged:
+    """A result with the costs by frame times of this machine; frame: simulated time of a frame [s]."""
+    cost, own = (_cost(timing, times, frame) for times in (timing.frame_ns, timing.cpu_ns))
+    why, name = timing.disturbed, timing.processor
+    return replace(one, cost=cost, processor_cost=own, timed_here=True, disturbed=why, processor=name)
 
-    frame_ns: (repeat, F) [ns]; frame: simulated time of a frame [s].
-    """
-    costs = 1e-9 * np.median(frame_ns, axis=1) / frame
-    return Measured(1e-9 * float(np.median(frame_ns)) / frame, float(np.ptp(costs)) / 2)
+
+def _cost(timing: FrameTiming, times: np.ndarray | None, frame: float) -> Measured:
+    """The median of `times` (repeat, F) [ns] over the simulated time of a frame [1], and half the range of that over
+    the repeats, NaN where the timing is disturbed."""
+    if times is None:
+        return UNKNOWN
+    spread = np.nan if timing.disturbed else float(np.ptp(1e-9 * np.median(times, axis=1) / frame)) / 2
+    return Measured(1e-9 * float(np.median(times)) / frame, spread)
 
 
 def cheapest(rows: Iterable[Judged], wish: Wish) -> Judged | None:

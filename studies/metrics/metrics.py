@@ -242,8 +242,9 @@ def contact_turn(run: Run) -> float:
     return float(np.degrees(np.arccos(np.clip(force @ scene.probed.direction / size, -1, 1)))) if size else float("nan")
 
 
-def _timing(run: Run, quantile: float) -> float:
-    return float("nan") if run.timing is None else float(np.quantile(run.timing.frame_ns, quantile))
+def _timing(run: Run, quantile: float, of: str = "frame_ns") -> float:
+    times = getattr(run.timing, of, None)
+    return float("nan") if times is None else float(np.quantile(times, quantile))
 
 
 def step_time(run: Run) -> float:
@@ -260,6 +261,11 @@ def frame_time(run: Run) -> float:
     return 1e-6 * _timing(run, 0.5)
 
 
+def frame_cpu(run: Run) -> float:
+    """Median processor time of a frame [ms]: what other programs disturb least."""
+    return 1e-6 * _timing(run, 0.5, "cpu_ns")
+
+
 def frame_time_p99(run: Run) -> float:
     """99th percentile of the frame time [ms]."""
     return 1e-6 * _timing(run, 0.99)
@@ -270,14 +276,19 @@ def real_time(run: Run) -> float:
     return float(run.attributes.frame) / (1e-9 * _timing(run, 0.5))
 
 
+def real_time_cpu(run: Run) -> float:
+    """Simulated seconds per second of processor time [1]."""
+    return float(run.attributes.frame) / (1e-9 * _timing(run, 0.5, "cpu_ns"))
+
+
 def _time_spread(metric: Callable[[Run], float]) -> Callable[[Run], float]:
-    """Half the range of a metric of frame times over the repeats, in its unit; NaN if the case was timed only once."""
+    """Half the range of a metric of frame times over the repeats, in its unit; NaN if the case was timed only once, or
+    the timing is disturbed: the range is then that of the other load."""
 
     def spread(run: Run) -> float:
-        if run.timing is None or len(run.timing.frame_ns) < 2:
+        if run.timing is None or len(run.timing.frame_ns) < 2 or run.timing.disturbed:
             return float("nan")
-        alone = [replace(run, timing=replace(run.timing, frame_ns=frames[None])) for frames in run.timing.frame_ns]
-        return float(np.ptp([metric(one) for one in alone])) / 2
+        return float(np.ptp([metric(replace(run, timing=one)) for one in run.timing.repeats()])) / 2
 
     return spread
 
@@ -315,6 +326,8 @@ METRICS: tuple[Metric, ...] = (
     Metric("contact_turn", "deg", "lower", contact_turn),
     Metric("step_time", "µs", "lower", step_time, spread=_time_spread(step_time)),
     Metric("frame_time", "ms", "lower", frame_time, spread=_time_spread(frame_time)),
+    Metric("frame_cpu", "ms", "lower", frame_cpu, spread=_time_spread(frame_cpu)),
     Metric("frame_time_p99", "ms", "lower", frame_time_p99, spread=_time_spread(frame_time_p99)),
     Metric("real_time", "s/s", "higher", real_time, spread=_time_spread(real_time)),
+    Metric("real_time_cpu", "s/s", "higher", real_time_cpu, spread=_time_spread(real_time_cpu)),
 )

@@ -9,7 +9,15 @@ import pandas as pd
 from massspring.methods.capabilities import No
 from studies.base.errors import StudyError
 from studies.base.lookup import lookup
-from studies.metrics.cells import FEW_MARK, UNCONVERGED_MARK
+from studies.metrics.cells import (
+    DISTURBED_MARK,
+    DISTURBED_NOTE,
+    FEW_MARK,
+    FEW_NOTE,
+    UNCONVERGED_MARK,
+    UNCONVERGED_NOTE,
+    UNRESOLVED_NOTE,
+)
 from studies.metrics.metric import Metric
 from studies.metrics.metrics import METRICS, few_facets
 from studies.metrics.run import Run
@@ -26,6 +34,12 @@ UNRESOLVED = "doubtful"
 """Column with the metrics whose value is less than ten times the uncertainty of the reference."""
 FEW_FACETS = "few facets"
 """Column that says whether a sphere or capsule touches fewer than eight facets."""
+DISTURBED, PROCESSOR = "disturbed", "processor"
+"""Columns of a table with times: why these are not those of the program alone, and the processor that they are of."""
+MARKS = {UNCONVERGED: UNCONVERGED_MARK, FEW_FACETS: FEW_MARK, DISTURBED: DISTURBED_MARK}
+NOTES = {UNRESOLVED: UNRESOLVED_NOTE, FEW_FACETS: FEW_NOTE, UNCONVERGED: UNCONVERGED_NOTE}
+NOTES |= {DISTURBED: DISTURBED_NOTE}
+"""Columns -> the mark of a row with something there, and what a table says of it."""
 
 
 def metric(name: str | Metric) -> Metric:
@@ -57,18 +71,18 @@ def study_table(runs: Sequence[Run], columns: Sequence[str | Metric]) -> pd.Data
 
 
 def frame_of(rows: Sequence[Row]) -> pd.DataFrame:
-    """Rows as a table, without empty "… floor" columns, and with FEW_FACETS only if it is true of one."""
+    """Rows as a table, without empty "… floor" columns, and with FEW_FACETS, DISTURBED and PROCESSOR only if one row
+    has something there."""
     frame = pd.DataFrame(rows)
-    if FEW_FACETS in frame and not any(row[FEW_FACETS] for row in rows):
-        frame = frame.drop(columns=FEW_FACETS)
+    seldom = [name for name in (FEW_FACETS, DISTURBED, PROCESSOR) if not any(row.get(name) for row in rows)]
+    frame = frame.drop(columns=seldom, errors="ignore")
     unknown = [name for name in frame.columns if " floor [" in name and frame[name].isna().to_numpy().all()]
     return frame.drop(columns=unknown)
 
 
 def marked(row: Mapping[Any, Any]) -> str:
-    """The method of a row, with UNCONVERGED_MARK if it is not converged, and FEW_MARK if it touches few facets."""
-    marks = [mark for key, mark in ((UNCONVERGED, UNCONVERGED_MARK), (FEW_FACETS, FEW_MARK)) if row.get(key)]
-    return " ".join([row["method"], *marks])
+    """The method of a row with its MARKS."""
+    return " ".join([row["method"], *(mark for key, mark in MARKS.items() if row.get(key))])
 
 
 def row_of(run: Run, metrics: Sequence[Metric]) -> Row:
@@ -94,5 +108,7 @@ def row_of(run: Run, metrics: Sequence[Metric]) -> Row:
         row[f"{entry.name} [{entry.unit}]"] = entry(run)
         row[f"{entry.name} floor [{entry.unit}]"] = entry.uncertainty(run)
     row[FEW_FACETS] = few_facets(run)
+    timing = run.timing if any(entry.spread is not None for entry in metrics) else None
+    row[DISTURBED], row[PROCESSOR] = ("", "") if timing is None else (timing.disturbed, timing.processor)
     row[UNRESOLVED] = " ".join(entry.name for entry in metrics if entry.unresolved(run))
     return row

@@ -8,15 +8,16 @@ from matplotlib.lines import Line2D
 
 from massspring import Free
 from studies.base.counting import heading
+from studies.metrics.cells import DISTURBED_MARK
 from studies.metrics.run import Run
 from studies.metrics.timing.statistics import Ratio, ratio_with_spread
 from studies.plots.style.bodies import body_looks
-from studies.plots.style.page import blank, finish, grouped, page
+from studies.plots.style.page import blank, finish, grouped, page, timing_notes
 from studies.plots.style.style import BLACK, GREY, NORMAL, drawing, method_colour, method_label, styled
 
 TITLE = "Cost of keeping the volume"
-Row = tuple[str, str, Ratio]
-"""Body, method, and the ratio of its frame time to that of the method without a constraint."""
+Row = tuple[str, str, Ratio, bool]
+"""Body, method, the ratio of its frame time to that of the method without a constraint, whether either is disturbed."""
 
 
 @styled
@@ -29,20 +30,21 @@ def figure(runs: Sequence[Run]) -> Figure:
     for place, row in enumerate(rows):
         _draw_row(axes, place, row)
     axes.axvline(1.0, color=BLACK, linewidth=1.2)
-    axes.set_yticks(range(len(rows)), [body for body, _, _ in rows])
+    axes.set_yticks(range(len(rows)), [body for body, *_ in rows])
     axes.tick_params(axis="y", length=0, labelsize=NORMAL)
     axes.grid(visible=False, axis="y")
-    low, high = min(ratio.low for _, _, ratio in rows), max(ratio.high for _, _, ratio in rows)
+    low, high = min(ratio.low for _, _, ratio, _ in rows), max(ratio.high for _, _, ratio, _ in rows)
     axes.set(xlim=(min(0.95, 0.97 * low), max(1.1, 1.03 * high)), ylim=(len(rows) - 0.4, -0.6))
     axes.set_xlabel("frame time with the constraint over frame time without [1]")
-    methods = dict.fromkeys(method for _, method, _ in rows)
+    methods = dict.fromkeys(method for _, method, *_ in rows)
     handles = [Line2D([], [], color=method_colour(m), marker="o", label=f"{method_label(m)} / free") for m in methods]
     unclear = "not resolvable: too few repeats, or 1 inside the interval"
     handles.append(Line2D([], [], color=GREY, marker="o", markerfacecolor="white", label=unclear))
-    confidence = ", ".join(sorted({f"{100 * ratio.confidence:.0f} %" for _, _, ratio in rows}))
+    confidence = ", ".join(sorted({f"{100 * ratio.confidence:.0f} %" for _, _, ratio, _ in rows}))
     notes = [
         f"Bar: interval of the median ratio over the repeats, confidence {confidence}. "
-        "Number after a body: its surface nodes."
+        "Number after a body: its surface nodes.",
+        *timing_notes(runs),
     ]
     return finish(sheet, TITLE, handles, notes, columns=3)
 
@@ -58,18 +60,21 @@ def ratios(runs: Sequence[Run]) -> list[Row]:
                 continue
             case = run.case
             name = f"{heading(case.scene.name)}, {looks[case.body].name}, {case.body.nodes:,}"
-            rows.append((name, case.method.name, ratio_with_spread(run.timing.frame_ns, free.frame_ns)))
+            disturbed = bool(run.timing.disturbed or free.disturbed)
+            rows.append((name, case.method.name, ratio_with_spread(run.timing.frame_ns, free.frame_ns), disturbed))
     return rows
 
 
 def _draw_row(axes: Axes, place: int, row: Row) -> None:
-    _, method, ratio = row
-    clear = ratio.resolvable
+    _, method, ratio, disturbed = row
+    clear = ratio.resolvable and not disturbed
     colour = method_colour(method) if clear else GREY
-    axes.plot([ratio.low, ratio.high], [place, place], color=colour, linewidth=3.5, alpha=0.45, solid_capstyle="butt")
+    bar = [] if disturbed else [ratio.low, ratio.high]
+    axes.plot(bar, [place] * len(bar), color=colour, linewidth=3.5, alpha=0.45, solid_capstyle="butt")
     axes.plot(ratio.median, place, marker="o", color=colour, markersize=8, markerfacecolor=colour if clear else "white")
     words = f"{ratio.median:.2f}  ({ratio.low:.2f} to {ratio.high:.2f})"
     words = words if clear else f"not resolvable  ({ratio.low:.2f} to {ratio.high:.2f})"
+    words = f"{ratio.median:.2f}  {DISTURBED_MARK}" if disturbed else words
     axes.text(1.02, place, words, transform=axes.get_yaxis_transform(), color=colour, va="center", size=NORMAL)
 
 

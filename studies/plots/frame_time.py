@@ -9,11 +9,12 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
 from studies.base.counting import heading
+from studies.metrics.cells import DISTURBED_MARK
 from studies.metrics.run import Run
 from studies.metrics.timing.protocol import FrameTiming
 from studies.metrics.timing.statistics import percentiles
 from studies.plots.style.bodies import body_looks
-from studies.plots.style.page import band_handle, blank, finish, grouped, log_axis, page, panels, remarks
+from studies.plots.style.page import band_handle, blank, finish, grouped, log_axis, page, panels, remarks, timing_notes
 from studies.plots.style.style import BLACK, GREY, SMALL, drawing, method_colour, method_label, styled
 
 TITLE = "Time of a frame"
@@ -48,9 +49,8 @@ def figure(runs: Sequence[Run]) -> Figure:
     for low in axes.flat[max(0, len(bodies) - COLUMNS) : len(bodies)]:
         low.set_xlabel("simulated time [s]")
     _draw_percentiles(below.subplots(), bodies, span, names)
-    return finish(
-        sheet, TITLE, _handles(timed), [_protocol([t for _, t in timed]), *remarks(_untimed(runs))], columns=7
-    )
+    notes = [_protocol([t for _, t in timed]), *timing_notes(runs), *remarks(_untimed(runs))]
+    return finish(sheet, TITLE, _handles(timed), notes, columns=7)
 
 
 def _untimed(runs: Sequence[Run]) -> list[Run]:
@@ -71,7 +71,8 @@ def _draw_history(axes: Axes, body: Sequence[Run], span: tuple[float, float], na
         colour = method_colour(run.case.method.name)
         low, high = frames.min(axis=0), frames.max(axis=0)
         # Rasterised in an SVG too, because the band has a corner at every frame.
-        axes.fill_between(t, low, high, color=colour, alpha=0.35, linewidth=0, rasterized=True)
+        if not run.timing.disturbed:
+            axes.fill_between(t, low, high, color=colour, alpha=0.35, linewidth=0, rasterized=True)
         axes.plot(t, np.median(frames, axis=0), color=colour, linewidth=1.1)
     for deadline in DEADLINES_MS:
         axes.axhline(deadline, color=GREY, linewidth=1, linestyle=DASHES)
@@ -106,7 +107,8 @@ def _draw_percentiles(
             axes.plot([quantiles["p50"], quantiles["max"]], [len(labels)] * 2, color=colour, linewidth=1)
             for name, marker in QUANTILE_MARKERS.items():
                 axes.plot(quantiles[name], len(labels), marker=marker, color=colour, markersize=6, markeredgewidth=1.8)
-            labels.append(names[id(run)] if place == 0 else "")
+            mark = f" {DISTURBED_MARK}" if run.timing.disturbed else ""
+            labels.append((names[id(run)] if place == 0 else "") + mark)
     for deadline in DEADLINES_MS:
         axes.axvline(deadline, color=GREY, linewidth=1, linestyle=DASHES)
         words, place = f"{deadline:g} ms", (deadline, 1.01)

@@ -21,6 +21,7 @@ from studies.plots.style.page import (
     page,
     panels,
     remarks,
+    timing_notes,
     unresolved_mark,
     unresolved_notes,
 )
@@ -158,6 +159,7 @@ def _notes(shown: Sequence[Run], metrics: Sequence[Metric], runs: Sequence[Run])
         f"Body: {'; '.join(bodies)}; the limit includes the method's own stiffness. Force: over all checkpoints. "
         "Displacement: volume-weighted relative L2, not compared where rigid rotation is possible. J: 5th to 95th "
         "percentile at the last checkpoint. Computing time per simulated second, one core. Arrows: too small to draw.",
+        *timing_notes(shown),
         *unresolved_notes(shown, metrics),
         *remarks(runs),
     ]

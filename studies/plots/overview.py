@@ -9,7 +9,7 @@ from matplotlib.lines import Line2D
 from studies.base.counting import readable
 from studies.metrics.metrics import force_end, real_time
 from studies.metrics.run import Run
-from studies.plots.style.page import blank, finish, page, panels
+from studies.plots.style.page import blank, finish, page, panels, timing_notes
 from studies.plots.style.style import BLACK, GREEN, GREY, NORMAL, VERMILLION, drawing, styled
 from studies.store.schema import COMPARABLE
 
@@ -33,7 +33,8 @@ Point = tuple[str, str, float, float]
 
 def figure(runs: Sequence[Run]) -> Figure:
     """A marker for each timed body that has a reference: all sizes, none chosen by its error."""
-    return figure_of([p for run in runs if (p := _point(run)) is not None])
+    points = {id(run): point for run in runs if (point := _point(run)) is not None}
+    return figure_of(list(points.values()), timing_notes([run for run in runs if id(run) in points]))
 
 
 def _point(run: Run) -> Point | None:
@@ -45,7 +46,7 @@ def _point(run: Run) -> Point | None:
 
 
 @styled
-def figure_of(points: Sequence[Point]) -> Figure:
+def figure_of(points: Sequence[Point], notes: Sequence[str] = ()) -> Figure:
     """The chart of points; those whose error or speed is not known are left out."""
     points = [point for point in points if np.isfinite(point[2:]).all()]
     if not points:
@@ -65,7 +66,7 @@ def figure_of(points: Sequence[Point]) -> Figure:
     there = [kind for kind in KINDS if any(point[0] == kind for point in points)]
     handles = [Line2D([], [], color=KINDS[kind], marker="s", linestyle="", label=NAMES[kind]) for kind in there]
     handles += [Line2D([], [], color=GREY, marker=m, linestyle="", label=readable(s)) for s, m in scenes.items()]
-    return finish(sheet, TITLE, handles, NOTES)
+    return finish(sheet, TITLE, handles, [*NOTES, *notes])
 
 
 draw = drawing(figure)

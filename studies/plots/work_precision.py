@@ -10,12 +10,24 @@ from matplotlib.patheffects import withStroke
 
 from studies.base.counting import heading, readable
 from studies.exchange.entry import is_entry
+from studies.metrics.cells import DISTURBED_MARK
 from studies.metrics.judged import DISPLACEMENT, FORCE, Judged, Measured, cheapest, front, judged, over_meshes
 from studies.metrics.metric import Metric
 from studies.metrics.run import Run, by_scene
 from studies.metrics.wish import usual_wish
 from studies.plots.style.families import OUTSIDE, PAPER, Family, family_of
-from studies.plots.style.page import blank, finish, log_axis, page, panels, remarks, unresolved_mark, unresolved_notes
+from studies.plots.style.page import (
+    MOST_NAMED,
+    blank,
+    finish,
+    log_axis,
+    page,
+    panels,
+    remarks,
+    timing_notes,
+    unresolved_mark,
+    unresolved_notes,
+)
 from studies.plots.style.style import BLACK, GREEN, GREY, SMALL, drawing, remark, styled
 from studies.runs.recipes import BodyRecipe
 from studies.scene.scene import Scene
@@ -31,8 +43,6 @@ REAL_TIME, HALF = 1.0, 0.5
 """Computing time over simulated time [1]."""
 ROOM, BELOW, SIDE = 1.6, 3.0, 2.0
 """Factors between the outermost values and the ends of the axes: above, below (with room for a name), at the sides."""
-MOST_NAMED = 3
-"""Most failed runs that a note names."""
 UNTIMED = (0, (6, 2))
 """Line of a case whose time is unknown."""
 STARS = ("*", (4, 1, 0), (5, 1, 36))
@@ -78,7 +88,7 @@ def figure_of(scenes: dict[str, list[Judged]], runs: Sequence[Run]) -> Figure:
     for panel in axes[-1]:
         panel.set_xlabel("computing time / simulated time [s/s]")
     log_axis(axes[-1, 0].xaxis)
-    notes = [*_notes(scenes), *_left_out(runs), *unresolved_notes(shown, (FORCE, DISPLACEMENT))]
+    notes = [*_notes(scenes), *timing_notes(shown), *_left_out(runs), *unresolved_notes(shown, (FORCE, DISPLACEMENT))]
     return finish(sheet, TITLE, _handles(scenes), notes, columns=3)
 
 
@@ -162,6 +172,8 @@ def _draw_point(panel: Axes, one: Judged, error: Measured, field: str) -> None:
         elinewidth=1.0,
         zorder=2,
     )
+    if one.disturbed:
+        panel.annotate(DISTURBED_MARK, (one.cost.value, height), (5, -3), textcoords="offset points", size=SMALL)
 
 
 def _size(look: Family) -> float:

@@ -4,7 +4,16 @@ each rung of the ladder of bodies."""
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from typing import Any, NamedTuple
 
-from studies.metrics.cells import FEW_NOTE, MISSING, UNCONVERGED_NOTE, UNRESOLVED_MARK, UNRESOLVED_NOTE, value_cell
+from studies.metrics.cells import (
+    DISTURBED_MARK,
+    DISTURBED_NOTE,
+    FEW_NOTE,
+    MISSING,
+    UNCONVERGED_NOTE,
+    UNRESOLVED_MARK,
+    UNRESOLVED_NOTE,
+    value_cell,
+)
 from studies.metrics.judged import Judged, Measured, cheapest, judged, nearest, over_meshes
 from studies.metrics.run import Run
 from studies.metrics.table import FEW_FACETS, UNCONVERGED, UNRESOLVED, marked, study_table
@@ -106,19 +115,20 @@ def recommended_of(runs: Sequence[Run]) -> str:
         "| mean [%] | rest shape / size [%] | rest volume [%] | simulated / computing time |",
         "|---|---|---|---|---|---|---|---|---|",
     ]
-    marked = False
+    marked, shown = False, []
     for name, bodies in compared_bodies(runs).items():
         choice, paper = choice_of(bodies[0].case.scene, bodies), paper_body(bodies)
         if choice is None or paper is None:
             continue
         marked |= not choice.meets
         chosen = choice.body
+        shown.append(chosen)
         words = f"{body_words(chosen.case.body)}, {chosen.case.dt_fraction:g}{'' if choice.meets else ' ‡'}"
         cells = [*_errors(paper), words, *_errors(chosen), *_shape(chosen), _real_time(chosen)]
         lines.append(f"| {name} | " + " | ".join(cells) + " |")
     if marked:
         lines += ["", f"‡ the closest candidate: {WHY_NONE}"]
-    return "\n".join(lines)
+    return "\n".join([*lines, *_on_times(shown)])
 
 
 def ladder_of(runs: Sequence[Run]) -> str:
@@ -128,13 +138,15 @@ def ladder_of(runs: Sequence[Run]) -> str:
         "| rest volume [%] | simulated / computing time |",
         "|---|---|---|---|---|---|---|---|---|",
     ]
+    shown = []
     volumes = {run.case.key: int(run.record.attributes.get("volumes", 0)) for run in runs}
     for name, bodies in compared_bodies(runs).items():
         for one in bodies:
             if name in LADDER_SCENES and one.advisable:
                 cells = [body_words(one.case.body), str(volumes[one.case.key]), f"{one.case.dt_fraction:g}"]
                 lines.append(f"| {name} | " + " | ".join([*cells, *_errors(one), *_shape(one), _real_time(one)]) + " |")
-    return "\n".join(lines)
+                shown.append(one)
+    return "\n".join([*lines, *_on_times(shown)])
 
 
 def _errors(one: Judged) -> list[str]:
@@ -156,7 +168,17 @@ def _percent(error: Measured, signed: bool) -> str:
 
 
 def _real_time(one: Judged) -> str:
-    return value_cell(1.0 / one.cost.value) if one.cost.known else MISSING
+    """Simulated over computing time and, in brackets, over processor time."""
+    wall, own = (value_cell(1.0 / cost.value) for cost in (one.cost, one.processor_cost))
+    mark = f" {DISTURBED_MARK}" if one.disturbed else ""
+    return (wall if own == MISSING else f"{wall} ({own})") + mark
+
+
+def _on_times(shown: Sequence[Judged]) -> list[str]:
+    """Lines below a table with times: the processor, and that some are disturbed."""
+    names = ", ".join(dict.fromkeys(one.processor for one in shown if one.processor))
+    lines = ["", f"Times of {names}; in brackets of processor time"] if names else []
+    return lines + (["", DISTURBED_NOTE] if any(one.disturbed for one in shown) else [])
 
 
 SUMMARIES: dict[str, dict[str, Callable[[Sequence[Run]], str]]] = {

@@ -201,7 +201,8 @@ class ReferenceAttributes(Table):
 class TimingFields(Table):
     """Of frame times."""
 
-    frame_ns = array("r F", NUMBER, "ns", "time of each frame, (repeat, frame)")
+    frame_ns = array("r F", NUMBER, "ns", "wall time of each frame, (repeat, frame)")
+    cpu_ns = optional_array("r F", NUMBER, "ns", "processor time of the thread in each frame, (repeat, frame)")
     stage_ns = optional_array("q F", NUMBER, "ns", "time of each stage in each frame, (stage, frame)")
     stages = optional_array("q", TEXT, "", "names of the stages")
 
@@ -212,6 +213,9 @@ class TimingAttributes(Timed):
     core = optional_value(int, "1", "core that the process was pinned to; none where it cannot be")
     threads = value(int, "1", "threads that compiled code was allowed")
     repeats = value(int, "1", "repeats", "r")
+    others = optional_value(float, "1", "share of the processors that other processes took; none where not known")
+    processor = optional_value(str, "", "its name")
+    disturbed = optional_value(str, "", "why the times are not those of the program alone; empty where nothing says so")
 
 
 RUN_FIELDS, RUN_ATTRIBUTES = lines_of(RunFields, FieldSpec), lines_of(RunAttributes, AttributeSpec)

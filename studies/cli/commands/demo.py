@@ -4,7 +4,6 @@ import time
 import warnings
 from pathlib import Path
 
-from massspring import simulate
 from studies.base.errors import StudyError
 from studies.catalog.demo import DEMO, WORDS
 from studies.cli.terminal import Results, say, warn
@@ -13,20 +12,19 @@ from studies.metrics.metrics import force_end, volume_worst
 from studies.metrics.run import Run
 from studies.metrics.table import metric
 from studies.metrics.timing.alone import alone
-from studies.metrics.timing.cases import write_timing
-from studies.metrics.timing.protocol import FrameTiming, interleave, pinned
+from studies.metrics.timing.cases import frames_of, write_timing
+from studies.metrics.timing.protocol import interleave, pinned
 from studies.report.page.write import write_page
 from studies.report.results import refresh
 from studies.runs.prepare import prepare
 from studies.store.ledger import Ledger
+from studies.store.machine import this_machine
 from studies.store.record import read_record
 from studies.sweep.compiling.main import bring_up_to_date
 from studies.sweep.job import CaseJob, case_jobs, do, reference_jobs
 from studies.sweep.load import load_runs
 
 REPEATS = 2
-BUSY = 0.1
-"""Share of the core that other programs may take."""
 
 
 def demo(results: Results = Path("organbench-demo")) -> None:
@@ -50,21 +48,20 @@ def demo(results: Results = Path("organbench-demo")) -> None:
         say(line(run, words))
     warn(refresh(ledger, DEMO)[1])
     page, _ = write_page(results, [DEMO])
+    say(f"processor: {this_machine().cpu}")
     say(f"{page}: the moving bodies and two charts ({time.perf_counter() - begin:.0f} s in all)")
 
 
 def time_frames(job: CaseJob) -> None:
-    """Stores the frame times of a case, of fewer repeats than a study takes; warns if other programs took the core."""
+    """Stores the frame times of a case, of fewer repeats than a study takes; warns if other programs disturbed them."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)  # the run has stored the warnings of its preparation
         setup = prepare(job.work).setup
     with alone(job.root), pinned(threads=1) as core:
-        wall, own = time.perf_counter(), time.process_time()
-        measured = interleave({job.work.name: lambda: simulate(setup).frame_ns}, REPEATS, warmups=0)
-        taken = 1.0 - (time.process_time() - own) / (time.perf_counter() - wall)
-    write_timing(job.root, DEMO.name, job.work, FrameTiming(measured[job.work.name], core))
-    if taken > BUSY:
-        warn([f"other programs took {100 * taken:.0f} % of the core: the speed is too low; close them and try again"])
+        (timing,) = interleave({job.work.name: lambda: frames_of(setup)}, REPEATS, warmups=0, core=core).values()
+    write_timing(job.root, DEMO.name, job.work, timing)
+    if timing.disturbed:
+        warn([f"{timing.disturbed}: the speed may be too low; close other programs and try again"])
 
 
 def line(run: Run, words: str) -> str:
@@ -74,4 +71,5 @@ def line(run: Run, words: str) -> str:
     uncertainty = 100 * reference.total_uncertainty["force_end"]
     numbers = f"volume {volume_worst(run):.2g} % off, force {force_end(run):+.1f} ± {uncertainty:.1f} %"
     speed = metric("real_time")
-    return f"{words}: {numbers}, {value_cell(speed(run), speed.uncertainty(run))} times real time"
+    times = f"{value_cell(speed(run), speed.uncertainty(run))} times real time"
+    return f"{words}: {numbers}, {times} ({value_cell(metric('real_time_cpu')(run))} by processor time)"

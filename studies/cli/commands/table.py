@@ -11,10 +11,10 @@ from studies.base.lookup import lookup
 from studies.catalog import Study
 from studies.cli.terminal import Results, StudyName, busy, console, say, warn
 from studies.exchange.entry import entries_beside
-from studies.metrics.cells import FEW_NOTE, MISSING, UNCONVERGED_NOTE, UNRESOLVED_NOTE, plain, value_cell
+from studies.metrics.cells import MISSING, plain, value_cell
 from studies.metrics.metric import Metric
 from studies.metrics.metrics import METRICS
-from studies.metrics.table import FEW_FACETS, UNCONVERGED, UNRESOLVED, frame_of, marked, row_of
+from studies.metrics.table import NOTES, PROCESSOR, UNRESOLVED, frame_of, marked, row_of
 from studies.metrics.table import metric as metric_of
 from studies.scene.quantities import ALWAYS
 from studies.store.entry import DAMAGED
@@ -108,12 +108,11 @@ def draw(rows: Sequence[Row], metrics: list[Metric], every: bool) -> None:
         rest = rest[len(columns) - len(labels) :]
         if not every:
             break
-    if any(row[UNRESOLVED] for row in rows):
-        say(UNRESOLVED_NOTE)
-    if any(row.get(FEW_FACETS) for row in rows):
-        say(FEW_NOTE)
-    if any(row.get(UNCONVERGED) for row in rows):
-        say(UNCONVERGED_NOTE)
+    for note in (note for key, note in NOTES.items() if any(row.get(key) for row in rows)):
+        say(note)
+    processors = dict.fromkeys(row[PROCESSOR] for row in rows if row.get(PROCESSOR))
+    if processors:
+        say(f"processor: {', '.join(processors)}")
     if rest:
         say(f"not shown (--all, --csv FILE, --metrics): {', '.join(metric.name for metric in rest)}")
 

@@ -14,7 +14,7 @@ from studies.metrics.distribution import BOUND, ENOUGH, Group, groups
 from studies.metrics.table import metric
 from studies.metrics.wish import usual_wish
 from studies.plots.style.families import family_of
-from studies.plots.style.page import band_handle, blank, finish, log_axis, page, panels
+from studies.plots.style.page import band_handle, blank, finish, log_axis, page, panels, timing_notes
 from studies.plots.style.style import GREEN, GREY, SMALL, drawing, remark, styled
 
 FRONT = "What the error of 95 of 100 random organs costs in computing time"
@@ -130,7 +130,8 @@ def front(runs: Sequence[Run]) -> Figure:
     log_axis(axes[-1, 0].xaxis)
     notes = [
         "Bars: 95 % confidence from resampling the members. Numbers: surface nodes. Green: within the target in real "
-        "time. Computing time is that of the first member of each organ."
+        "time. Computing time is that of the first member of each organ.",
+        *timing_notes(runs),
     ]
     return finish(sheet, FRONT, list(handles.values()), notes, columns=3)
 

@@ -79,6 +79,7 @@ def population_study(
             "volume_worst",
             "min_j",
             "real_time",
+            "real_time_cpu",
             "sway",
         ),
     )

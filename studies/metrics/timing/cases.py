@@ -4,7 +4,11 @@
 import time
 import warnings
 from collections.abc import Callable, Iterable
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
+
+import numpy as np
 
 from massspring import Free, Setup, simulate
 from studies.base.compile_watch import watching
@@ -31,7 +35,15 @@ def timing_file(root: Path, study: str, case: Case) -> Path:
 
 
 def timing_of(record: Record) -> FrameTiming:
-    return FrameTiming(record.fields["frame_ns"].values, record.attributes.get("core"), record.attributes["threads"])
+    own, attributes = record.fields.get("cpu_ns"), record.attributes
+    return FrameTiming(
+        record.fields["frame_ns"].values,
+        attributes.get("core"),
+        attributes["threads"],
+        cpu_ns=None if own is None else own.values,
+        others=attributes.get("others"),
+        processor=attributes.get("processor") or "",
+    )
 
 
 def time_cases(root: Path, study: str, cases: Iterable[Case], on_case: Callable[[str], None]) -> None:
@@ -50,14 +62,20 @@ def time_cases(root: Path, study: str, cases: Iterable[Case], on_case: Callable[
                 with warnings.catch_warnings():
                     warnings.simplefilter("ignore", UserWarning)  # the run has stored the warnings of its preparation
                     setups = {case.key: prepare(case).setup for case in group}
-                contestants = {key: (lambda s=setup: simulate(s).frame_ns) for key, setup in setups.items()}
-                measured = interleave(contestants, max(map(repeats_for, setups.values())), warmups=0)
+                contestants = {key: partial(frames_of, setup) for key, setup in setups.items()}
+                measured = interleave(contestants, max(map(repeats_for, setups.values())), warmups=0, core=core)
                 stages = {case.key: stage_times(setups[case.key]) for case in group}
             seconds = (time.perf_counter() - started - watch.seconds) / len(group)
             for case in group:
-                timing = FrameTiming(measured[case.key], core, stage_ns=stages[case.key], stages=ROWS)
+                timing = replace(measured[case.key], stage_ns=stages[case.key], stages=ROWS)
                 write_timing(root, study, case, timing, seconds)
                 on_case(case.name)
+
+
+def frames_of(setup: Setup) -> np.ndarray:
+    """Wall and processor time of the frames of a run [ns], (2, F)."""
+    history = simulate(setup)
+    return np.stack([history.frame_ns, history.cpu_ns])
 
 
 def repeats_for(setup: Setup) -> int:

@@ -50,7 +50,7 @@ def short_timing(case: Case, seconds: float = SECONDS) -> ShortTiming:
             run_frames(setup, start, frames=min(PROBED, clock.frames))
             each = (perf_counter() - begin) / min(PROBED, clock.frames)
             frames = max(1, min(clock.frames, int(seconds / (REPEATS + 1) / each)))
-            measured = interleave({case.name: lambda: run_frames(setup, start, frames=frames)[0]}, REPEATS)
+            measured = interleave({case.name: lambda: run_frames(setup, start, frames=frames)[0]}, REPEATS, core=core)
     except MassSpringError as error:
         raise StudyError(f"{case.name} cannot be timed here: {error}") from error
-    return ShortTiming(FrameTiming(measured[case.name], core), clock.frame, frames, clock.dt)
+    return ShortTiming(measured[case.name], clock.frame, frames, clock.dt)

@@ -7,7 +7,7 @@ of the stages is the rest.
 
 from dataclasses import replace
 from functools import partial
-from time import perf_counter_ns
+from time import perf_counter_ns, thread_time_ns
 
 import numpy as np
 import pandas as pd
@@ -51,33 +51,34 @@ STAGE, SKIPPED, FRAME = "stage", "skipped", "per frame"
 
 
 TimedFrames = tuple[np.ndarray, np.ndarray, State]
-"""Time of each frame [ns], (F,); times of its ROWS without the cost of timing [ns], (rows, F); the last state."""
+"""Wall and processor time of each frame [ns], (2, F); times of its ROWS without the cost of timing [ns], (rows, F); the
+last state."""
 
 
 def run_frames(setup: Setup, state: State, times: StageTimes = UNTIMED, frames: int | None = None) -> TimedFrames:
     """Runs the first `frames` of a set-up, or all. Raises MassSpringError for a run that diverges."""
     state = replace(state, diagnostics=state.diagnostics._replace(stage_times=times))
     frames = setup.clock.frames if frames is None else frames
-    frame_ns, stage_ns = np.zeros(frames), np.zeros((len(ROWS), frames))
+    taken, stage_ns = np.zeros((2, frames)), np.zeros((len(ROWS), frames))
     price = end_stage_ns() if times.on[0] else 0.0
     loaded = LoadedSteps(setup, state)
     for frame in range(frames):
         boundary = setup.boundary(frame, steps=loaded.steps)
         if times.on[0]:
             times.spent[:], times.ended[:] = 0, 0
-        begin = perf_counter_ns()
+        own, begin = thread_time_ns(), perf_counter_ns()
         state, _ = loaded.advanced(Stage(setup, state), state, frame, boundary)
-        frame_ns[frame] = perf_counter_ns() - begin
+        taken[:, frame] = perf_counter_ns() - begin, thread_time_ns() - own
         if times.on[0]:
             # The time of a very short stage may be less than the cost of timing it.
             stage_ns[:BETWEEN_FRAMES, frame] = np.maximum(
                 times.spent[:BETWEEN_FRAMES] - price * times.ended[:BETWEEN_FRAMES], 0.0
             )
-            stage_ns[BETWEEN_FRAMES, frame] = frame_ns[frame] - times.spent[:BETWEEN_FRAMES].sum()
+            stage_ns[BETWEEN_FRAMES, frame] = taken[0, frame] - times.spent[:BETWEEN_FRAMES].sum()
         reason = check_state(state, setup.body)
         if reason is not None:
             raise MassSpringError(f"the run broke off while its cost was measured: {reason}; take a smaller dt")
-    return frame_ns, stage_ns, state
+    return taken, stage_ns, state
 
 
 def stage_times(setup: Setup) -> np.ndarray:
@@ -115,7 +116,9 @@ def cost_table(case: Case, frames: int = FRAMES, repeats: int = REPEATS, budget:
         turns = _in_turns(runs, repeats, budget)
         outside = _per_frame(setup)
     to_step = 1e-3 / setup.clock.steps
-    whole = {name: to_step * float(np.min([r[0] for r in results], axis=0).mean()) for name, results in turns.items()}
+    whole = {
+        name: to_step * float(np.min([r[0][0] for r in results], axis=0).mean()) for name, results in turns.items()
+    }
     step = whole[PLAIN]
     stages = to_step * _fastest(turns[TIMED]).mean(axis=1)
     rows = [(STAGE, name, cost, "") for name, cost in zip(ROWS, stages, strict=True) if cost > 0]
@@ -149,7 +152,7 @@ def _in_turns(runs: dict[str, partial[TimedFrames]], repeats: int, budget: float
             if shortest[name] > EXPENSIVE * shortest[PLAIN]:
                 continue
             turns[name].append(run())
-            took = float(turns[name][-1][0].sum())
+            took = float(turns[name][-1][0][0].sum())
             shortest[name] = min(took, shortest[name]) if turn else took
         longest = perf_counter_ns() - start  # later turns skip expensive runs, so they take no longer
     return turns
@@ -157,7 +160,7 @@ def _in_turns(runs: dict[str, partial[TimedFrames]], repeats: int, budget: float
 
 def _fastest(timed: list[TimedFrames]) -> np.ndarray:
     """Times of ROWS in the fastest repeat of each frame, (rows, F)."""
-    quickest = np.argmin([frame_ns for frame_ns, _, _ in timed], axis=0)
+    quickest = np.argmin([taken[0] for taken, _, _ in timed], axis=0)
     stages = np.stack([stage_ns for _, stage_ns, _ in timed])
     return stages[quickest, :, np.arange(stages.shape[2])].T
 
@@ -171,7 +174,7 @@ def _per_frame(setup: Setup) -> dict[str, float]:
 
     def recording(frame: int) -> None:
         account.add(state, clock.steps)
-        recorder.record(frame, state, clock.steps, 0)
+        recorder.record(frame, state, clock.steps, (0, 0))
         recorder.record_energy(frame, account)
 
     for frame in range(clock.frames):

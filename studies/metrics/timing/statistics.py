@@ -9,6 +9,10 @@ from studies.base.errors import StudyError
 
 DEADLINES_MS = (1.0, 2.0, 25.0, 33.0)
 """Haptics at 1 kHz and 500 Hz, the paper's 40 frames/s, video at 30 frames/s."""
+DISTURBED = 0.1
+"""Share of the wall time of a repeat in which the program did not run, and share of the machine's processors that other
+processes took, above which a timing is disturbed: who uses its core makes it wait, who uses others slows clock, cache
+and memory."""
 CONFIDENCE = 0.9  # five repeats give 0.9375; fewer than five cannot resolve anything
 
 
@@ -19,6 +23,20 @@ def percentiles(frame_ns: np.ndarray) -> dict[str, float]:
     """
     p50, p95, p99 = np.percentile(frame_ns, [50, 95, 99], method="higher")
     return {"p50": float(p50), "p95": float(p95), "p99": float(p99), "max": float(np.max(frame_ns))}
+
+
+def disturbance(frame_ns: np.ndarray, cpu_ns: np.ndarray | None, others: float | None) -> str:
+    """Why frame times are not those of the program alone, in words; empty where nothing says so.
+
+    frame_ns, cpu_ns: wall and processor time (repeat, F) [ns]; others: share of the machine's processors that other
+    processes took, 0 to 1. None: unknown.
+    """
+    waited = 0.0 if cpu_ns is None else float(np.max(1.0 - cpu_ns.sum(axis=1) / frame_ns.sum(axis=1)))
+    shares = {
+        f"the program waited {100 * waited:.0f} % of a repeat": waited,
+        f"other processes took {100 * (others or 0.0):.0f} % of the processors": others or 0.0,
+    }
+    return ", ".join(words for words, share in shares.items() if share > DISTURBED)
 
 
 def missed(frame_ns: np.ndarray, deadlines_ms: tuple[float, ...] = DEADLINES_MS) -> dict[float, float]:

@@ -13,7 +13,7 @@ from matplotlib.ticker import FuncFormatter
 from scipy.optimize import isotonic_regression
 
 from studies.base.counting import heading, readable
-from studies.metrics.cells import MINUS, UNRESOLVED_MARK
+from studies.metrics.cells import DISTURBED_NOTE, MINUS, UNRESOLVED_MARK
 from studies.metrics.metric import Metric
 from studies.metrics.run import Run, by_scene
 from studies.plots.style.style import BLACK, GREY, SMALL, remark, styled
@@ -26,7 +26,8 @@ NARROWEST = 8.0
 """Width of a page with one panel [inch]."""
 HANDLE = 0.62
 """Width of a legend entry without its words [inch]."""
-MOST_NOTES = 8
+MOST_NOTES, MOST_NAMED = 8, 3
+"""Notes below a chart, and cases that one of them names."""
 SHORT = 200.0
 """A logarithmic axis whose ends have a smaller ratio than this has numbers between the decades."""
 
@@ -125,6 +126,19 @@ def remarks(runs: Sequence[Run]) -> list[str]:
     bare = [name for name, group in by_scene(runs).items() if all(run.reference is None for run in group)]
     missing = [f"No error is shown for {', '.join(map(readable, bare))}, because it has no reference."] if bare else []
     return [*missing, *ended]
+
+
+def timing_notes(runs: Sequence[Run]) -> list[str]:
+    """On the frame times of runs: of which processor, how much of them was processor time, which are disturbed."""
+    timed = [(run, run.timing) for run in runs if run.timing is not None]
+    names = ", ".join(dict.fromkeys(timing.processor for _, timing in timed if timing.processor))
+    shares = [100 * own.sum() / timing.frame_ns.sum() for _, timing in timed if (own := timing.cpu_ns) is not None]
+    notes = [f"Wall times of {names}; processor time is {min(shares):.0f} to {max(shares):.0f} %."] if shares else []
+    disturbed = [run.case.name for run, timing in timed if timing.disturbed]
+    if disturbed:
+        more = f" and {len(disturbed) - MOST_NAMED} more" if len(disturbed) > MOST_NAMED else ""
+        notes.append(f"{DISTURBED_NOTE}: {', '.join(disturbed[:MOST_NAMED])}{more}.")
+    return notes
 
 
 def unresolved_notes(runs: Sequence[Run], metrics: Sequence[Metric]) -> list[str]:

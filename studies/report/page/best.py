@@ -7,9 +7,10 @@ from typing import Any
 from studies.base.counting import counted, readable
 from studies.exchange.entry import sides_of
 from studies.meshing.bounds import SHAPE, SHAPE_VOLUME
-from studies.metrics.cells import MISSING, plain, value_cell
+from studies.metrics.cells import DISTURBED_MARK, MISSING, plain, value_cell
 from studies.metrics.judged import Judged, Measured, by_cost
 from studies.metrics.run import Run
+from studies.metrics.table import DISTURBED, PROCESSOR
 from studies.metrics.wish import Wish, usual_wish
 from studies.report.summary import PAPER, choice_of, compared_bodies, paper_body
 from studies.runs.case import Case
@@ -22,15 +23,17 @@ from studies.tools.advise.words import wish_words
 Best = dict[str, Any]
 """Of a scene, JSON-able: the target in words, whether the body meets it, the body with its step over the limit, the id
 of its case, each number as [value, uncertainty] or None; `paper`: the same of the paper's body, or None."""
-NUMBERS = ("force", "displacement", "shape", "volume", "speed")
+NUMBERS = ("force", "displacement", "shape", "volume", "speed", "processor_speed")
 HEADS = ("body, surface nodes, step / limit", "force [%]", "mean [%]", "shape [%]", "volume [%]", "speed [s/s]")
+HEADS += ("by processor time [s/s]",)
 SIGNED = ("force", "volume")
 SHAPE_WORDS = f"shape within {SHAPE:g} % of the organ's size, its volume within {SHAPE_VOLUME:g} %"
 """The bounds that `cheapest` adds to every wish."""
 MISSED = {"force": "force", "displacement": "displacement", "shape": "shape", "shape_volume": "volume of the shape"}
 """Bounds of `Judged.shares` in words."""
 MISSES = "misses the target"
-SPEED, SPEED_FLOOR = "real_time [s/s]", "real_time floor [s/s]"
+SPEEDS = {"speed": "real_time{} [s/s]", "processor_speed": "real_time_cpu{} [s/s]"}
+"""Column of a table with each speed, {} for " floor"."""
 
 
 def case_id(case: Case) -> str:
@@ -83,10 +86,8 @@ def _best(bodies: Sequence[Judged], id_of: Callable[[Judged], str]) -> Best | No
 
 
 def _row(one: Judged, number: str, words: str = "") -> Best:
-    cost = one.cost
-    speed = Measured(1 / cost.value, cost.uncertainty / cost.value**2) if cost.known else cost
     numbers = {"force": one.force, "displacement": one.displacement, "shape": one.shape, "volume": one.shape_volume}
-    numbers["speed"] = speed
+    numbers |= {"speed": _inverse(one.cost), "processor_speed": _inverse(one.processor_cost)}
     pairs = {
         name: [number.value, number.uncertainty if number.uncertainty == number.uncertainty else 0.0]
         if number.known
@@ -94,7 +95,12 @@ def _row(one: Judged, number: str, words: str = "") -> Best:
         for name, number in numbers.items()
     }
     words = words or f"{body_words(one.case.body)}, {one.case.dt_fraction:g}"
-    return {"body": words, "case": number, "meshes": max(1, len(one.members)), **pairs}
+    row = {"body": words, "case": number, "meshes": max(1, len(one.members)), **pairs}
+    return row | {DISTURBED: bool(one.disturbed), PROCESSOR: one.processor}
+
+
+def _inverse(cost: Measured) -> Measured:
+    return Measured(1 / cost.value, cost.uncertainty / cost.value**2) if cost.known else cost
 
 
 def joined_best(parts: Sequence[Sequence[Best]], rows: Sequence[Mapping[str, Any]]) -> list[Best]:
@@ -103,18 +109,25 @@ def joined_best(parts: Sequence[Sequence[Best]], rows: Sequence[Mapping[str, Any
     scenes: dict[str, list[Best]] = {}
     for row in (row for part in parts for row in part):
         scenes.setdefault(row["scene"], []).append(row)
-    speeds = {row["case"]: [row[SPEED], row.get(SPEED_FLOOR) or 0.0] for row in rows if row.get(SPEED) is not None}
+    times = {row["case"]: _times(row) for row in rows if row.get(SPEEDS["speed"].format("")) is not None}
     best = []
     for group in scenes.values():
         chosen = min(group, key=lambda row: row["order"])
         paper = next((row["paper"] for row in group if row["paper"]), None)
         entries = [entry for row in group for entry in row.get("entries", ())]
-        best.append(_timed(chosen, speeds) | {"paper": _timed(paper, speeds) if paper else None, "entries": entries})
+        best.append(_timed(chosen, times) | {"paper": _timed(paper, times) if paper else None, "entries": entries})
     return best
 
 
-def _timed(row: Best, speeds: Mapping[str, list[float]]) -> Best:
-    return row | {"speed": row["speed"] or speeds.get(row["case"])} if row["body"] else row
+def _times(row: Mapping[str, Any]) -> Best:
+    """What a row of a table says of times."""
+    ends = {name: (row.get(column.format("")), row.get(column.format(" floor"))) for name, column in SPEEDS.items()}
+    speeds = {name: None if speed is None else [speed, floor or 0.0] for name, (speed, floor) in ends.items()}
+    return {**speeds, DISTURBED: bool(row.get(DISTURBED)), PROCESSOR: row.get(PROCESSOR)}
+
+
+def _timed(row: Best, times: Mapping[str, Best]) -> Best:
+    return row | times.get(row["case"], {}) if row["body"] and not row["speed"] else row
 
 
 def own_first(best: Sequence[Best], own: Collection[str]) -> list[Best]:
@@ -202,7 +215,10 @@ def _meshes(rows: Sequence[Best]) -> str:
 
 def _speed(rows: Sequence[Best]) -> str:
     speed = _span(rows, "speed")
-    return f"{speed} s simulated in a second of computing on one core" if speed else ""
+    names = ", ".join(dict.fromkeys(name for row in rows if (name := row.get(PROCESSOR))))
+    disturbed = f" {DISTURBED_MARK}" if any(row.get(DISTURBED) for row in rows) else ""
+    core = f"one core{f' of {names}' if names else ''}{disturbed}"
+    return f"{speed} s simulated in a second of computing on {core}" if speed else ""
 
 
 def _beside(words: str) -> str:
@@ -239,4 +255,5 @@ def _cells(row: Best) -> dict[str, Any]:
     # Parts that are older have no volume.
     pairs = {name: number for name in NUMBERS if (number := row.get(name))}
     numbers = [value_cell(*pairs[name], signed=name in SIGNED) if name in pairs else MISSING for name in NUMBERS]
+    numbers[NUMBERS.index("speed")] += f" {DISTURBED_MARK}" if row.get(DISTURBED) else ""
     return {"case": row["case"], "body": row["body"], "numbers": numbers}

@@ -7,7 +7,7 @@ from typing import NamedTuple
 from studies.base.errors import StudyError
 from studies.base.lookup import lookup
 from studies.catalog.accuracy import ACCURACY
-from studies.metrics.judged import UNKNOWN, Judged, cheapest, cost_of_frames, nearest
+from studies.metrics.judged import UNKNOWN, Judged, cheapest, nearest, with_times
 from studies.metrics.timing.short import ShortTiming, short_timing
 from studies.metrics.wish import Wish
 from studies.runs.recipes import BodyRecipe
@@ -165,8 +165,7 @@ def _timed(answer: Advice) -> Advice:
     if one is None or one.timed_here:
         return answer
     short = short_timing(one.case)
-    cost = cost_of_frames(short.timing.frame_ns, short.frame)
-    timed = replace(one, cost=cost, dt=short.dt, timed_here=True)
+    timed = replace(with_times(one, short.timing, short.frame), dt=short.dt)
     return replace(answer, chosen=timed, meets=answer.meets and timed.worst(answer.wish) <= 1.0, short=short)
 
 

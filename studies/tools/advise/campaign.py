@@ -15,6 +15,7 @@ from studies.catalog.of_scene import study_of
 from studies.catalog.study import Study
 from studies.metrics.judged import DISPLACEMENT, DISTANCE, FORCE, VOLUME, Judged, Measured, judged, over_meshes
 from studies.metrics.metric import Metric
+from studies.metrics.table import DISTURBED, PROCESSOR
 from studies.runs.case import Case
 from studies.runs.current import case_path
 from studies.runs.recipe_text import case_of_recipe, recipe_text
@@ -25,7 +26,7 @@ from studies.sweep.load import load_runs
 
 PUBLISHED = "published"
 """Folder below the results with tables that come with the repository."""
-COST = "real_time [s/s]"
+COST, PROCESSOR_COST = "real_time [s/s]", "real_time_cpu [s/s]"
 Row = dict[Any, Any]
 PACKAGE = Path(studies.__file__).parent
 
@@ -131,9 +132,11 @@ def published_table(published: Path, scene: Scene, study: str = ACCURACY.name) -
 
 def _judged_row(scene: Scene, row: Row, here: bool) -> Judged:
     case: Case = case_of_recipe(scene, row["recipe"])
-    cost = Measured(1.0 / float(row[COST]) if float(row.get(COST, "nan")) > 0 else float("nan"))
+    cost, own = (Measured(1.0 / float(row.get(name) or "nan")) for name in (COST, PROCESSOR_COST))
+    disturbed, processor = (text if isinstance(text := row.get(name), str) else "" for name in (DISTURBED, PROCESSOR))
     force, displacement, shape, volume = (_of(row, entry) for entry in (FORCE, DISPLACEMENT, DISTANCE, VOLUME))
-    return Judged(case, force, displacement, cost, 1e-3 * float(row["dt [ms]"]), here, shape, volume)
+    one = Judged(case, force, displacement, cost, 1e-3 * float(row["dt [ms]"]), here, own, disturbed, processor)
+    return replace(one, shape=shape, shape_volume=volume)
 
 
 def _of(row: Row, metric: Metric) -> Measured:

@@ -1,6 +1,7 @@
 """Bounds for a scene that was never run: the worst that was measured in the scenes of its kind."""
 
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 
 from studies.base.errors import DoesNotApply
 from studies.metrics.judged import UNKNOWN, Judged, Measured
@@ -33,7 +34,9 @@ def worst_of(scene: Scene, groups: Sequence[Sequence[Judged]]) -> list[Judged]:
             continue
         force, displacement, cost, shape, volume = (_largest([getattr(one, name) for one in same]) for name in NUMBERS)
         meshes = tuple(mesh for one in same for mesh in one.members)
-        recipes.append(Judged(case, force, displacement, cost, shape=shape, shape_volume=volume, members=meshes))
+        disturbed = next((one.disturbed for one in same if one.disturbed), "")
+        worst = Judged(case, force, displacement, cost, disturbed=disturbed, shape=shape, shape_volume=volume)
+        recipes.append(replace(worst, members=meshes))
     return recipes
 
 

@@ -137,11 +137,16 @@ def _computing(answer: Advice, one: Judged) -> str:
     if not one.cost.known:
         return "not known; leave out --no-timing to measure it here"
     spread = f" ± {one.cost.uncertainty:.1g}" if one.cost.uncertainty == one.cost.uncertainty else ""
-    text = f"{one.cost.value:.3g}{spread} ms per 1 ms of simulated time, {1.0 / one.cost.value:.3g} times real time"
+    own = f" ({one.processor_cost.value:.3g} of processor time)" if one.processor_cost.known else ""
+    text = (
+        f"{one.cost.value:.3g}{spread} ms{own} per 1 ms of simulated time, {1.0 / one.cost.value:.3g} times real time"
+    )
+    text += f", disturbed ({one.disturbed})" if one.disturbed else ""
+    machine = f"{'this' if one.timed_here else 'another'} machine{one.processor and f' ({one.processor})'}"
     if answer.short is not None:
         whole = answer.scene.duration
-        return f"{text}, on this machine, timed over the first {answer.short.covered:.2g} of {whole:g} s"
-    return f"{text}, on {'this' if one.timed_here else 'another'} machine"
+        return f"{text}, on {machine}, timed over the first {answer.short.covered:.2g} of {whole:g} s"
+    return f"{text}, on {machine}"
 
 
 def _command(answer: Advice, case: Case) -> str:

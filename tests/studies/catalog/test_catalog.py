@@ -15,7 +15,7 @@ from studies.sweep.find_study import MAIN, find_studies, find_study
 from tests.campaigns import campaigns_but
 from tests.studies.tiny import tiny_case, tiny_study
 
-TIMES = {"step_time", "frame_time", "frame_time_p99", "real_time"}
+TIMES = {"step_time", "frame_time", "frame_time_p99", "frame_cpu", "real_time", "real_time_cpu"}
 
 
 @pytest.fixture(params=STUDIES, ids=lambda study: study.name)

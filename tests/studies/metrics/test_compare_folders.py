@@ -212,6 +212,8 @@ def test_times_are_judged_on_one_machine_alone(tmp_path, organbench, machines):
         "step_time": Verdict.MOVED if same else Verdict.OTHER_MACHINE,
         "real_time": Verdict.NOT_RESOLVABLE if same else Verdict.OTHER_MACHINE,
     }
+    disturbed = timed(tmp_path / "disturbed", machines[1], **SLOW, disturbed="the program waited 20 % of a repeat")
+    assert Verdict.MOVED not in {change.verdict for change in compare(old, disturbed).changes}
     code, out, _ = organbench("compare", old, new)
     assert code == same and ("median ratio 1.5 (new / old), 4 times not judged" in out) != same
 

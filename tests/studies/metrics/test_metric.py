@@ -48,7 +48,7 @@ def test_every_metric_is_a_number_somewhere(entry):
     # Of scenes with a cut: tests/studies/runs/test_cutting.py.
     if entry.name in ("opening_error", "overlap") or entry.name.startswith(("piece_", "cut_")):
         return
-    timing = FrameTiming(np.full((2, 4), 1e6))
+    timing = FrameTiming(np.full((2, 4), 1e6), cpu_ns=np.full((2, 4), 1e6))
     kept = {"attributes": {"lumen_column": 0}} if entry.quantity == "lumen" else {}
     values = [
         entry(run(scene=replace(scene, checkpoints=(2.0, 4.0), probed=SCENE.probed), timing=timing, **kept))

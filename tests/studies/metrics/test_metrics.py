@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from massspring import Plane, Sphere
+from studies.metrics.judged import judged
 from studies.metrics.metrics import contact_facets, contact_turn, few_facets, lumen_pressure_error
-from studies.metrics.table import metric
+from studies.metrics.table import DISTURBED, PROCESSOR, frame_of, marked, metric, row_of
 from studies.metrics.timing.protocol import FrameTiming
 from studies.runs.recipes import TetrahedralBody
 from studies.scene.scene import ForceOutput
@@ -162,6 +163,9 @@ def test_times():
     assert of("step_time", timing=timing) == pytest.approx(1e3 * 50.5 / 20, rel=1e-12)
     assert of("frame_time_p99", timing=timing) == pytest.approx(99.01, rel=1e-12)
     assert of("real_time", timing=timing) == pytest.approx(1 / 0.0505, rel=1e-12)
+    own = replace(timing, cpu_ns=timing.frame_ns / 2)
+    assert of("frame_cpu", timing=own) == pytest.approx(25.25, rel=1e-12) and np.isnan(of("frame_cpu", timing=timing))
+    assert of("real_time_cpu", timing=own) == pytest.approx(2 / 0.0505, rel=1e-12)
     assert np.isnan([of(name) for name in ("frame_time", "step_time", "frame_time_p99", "real_time")]).all()
 
 
@@ -189,6 +193,24 @@ def test_the_spread_of_a_time_is_half_its_range_over_the_repeats():
     assert spread is not None
     assert spread(run(timing=FrameTiming(times))) == pytest.approx(1.5, rel=1e-12)
     assert np.isnan(spread(run(timing=FrameTiming(times[:1]))))
+    own = metric("frame_cpu").spread
+    assert own is not None
+    assert own(run(timing=FrameTiming(times, cpu_ns=0.98 * times))) == pytest.approx(0.98 * 1.5, rel=1e-12)
+
+
+def test_a_disturbed_time_has_no_spread_and_is_marked():
+    """It waited a fifth of the second repeat."""
+    times = np.full((2, 4), 5e6)
+    disturbed = run(timing=FrameTiming(times, cpu_ns=times * [[0.95], [0.8]], processor="Z80"))
+    quiet = run(timing=FrameTiming(times, cpu_ns=0.95 * times, processor="Z80"))
+    row, other = (row_of(one, [metric("frame_time")]) for one in (disturbed, quiet))
+    assert np.isnan(row["frame_time floor [ms]"]) and other["frame_time floor [ms]"] == 0.0
+    assert "waited 20 %" in row[DISTURBED] and marked(row).endswith("¶") and "¶" not in marked(other)
+    assert list(frame_of([row, other])[PROCESSOR]) == ["Z80", "Z80"] and DISTURBED not in frame_of([other])
+    assert row_of(disturbed, [metric("min_j")])[DISTURBED] == ""
+    costs = [judged(one) for one in (disturbed, quiet)]
+    assert np.isnan(costs[0].cost.uncertainty) and costs[0].disturbed == row[DISTURBED]
+    assert costs[1].cost.uncertainty == 0.0 and costs[1].processor_cost.value == pytest.approx(0.95 * 5e-3)
 
 
 def test_the_pressure_of_a_lumen_is_that_of_its_own_column():

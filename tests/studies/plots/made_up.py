@@ -101,7 +101,8 @@ def fields(scene, kind, error, volume_end, good):
 
 
 def run(scene=BALL_SQUEEZE, kind="tetrahedral", method=None, status=Status.OK, error=0.2, **options) -> Run:
-    """One run. Options: volume_end [1], with_reference, frame_ms, nodes, stiffness, dt [s], dt_limit [s], fraction."""
+    """One run. Options: volume_end [1], with_reference, frame_ms, cpu (processor over wall time), nodes, stiffness,
+    dt [s], dt_limit [s], fraction."""
     good = {Status.DIVERGED: 5, Status.TIMED_OUT: 9}.get(status, FRAMES)
     dt, fixed_step = options.get("dt", 1e-3), "dt" in options
     case = Case(
@@ -137,6 +138,8 @@ def run(scene=BALL_SQUEEZE, kind="tetrahedral", method=None, status=Status.OK, e
     )
     reference_record = reference(scene) if options.get("with_reference", True) else None
     timing = FrameTiming(frame_ns(options["frame_ms"]), 0) if "frame_ms" in options else None
+    if timing is not None and "cpu" in options:
+        timing = replace(timing, cpu_ns=options["cpu"] * timing.frame_ns, processor="Z80")
     return Run(case, record, reference_record, timing)  # type: ignore[arg-type]
 
 

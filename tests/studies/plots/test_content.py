@@ -5,10 +5,21 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from matplotlib.colors import to_hex
+from matplotlib.text import Text
 
 from massspring import Free, ImplicitVolume
 from studies.metrics.metric import Metric
-from studies.plots import accuracy, cost_ratio, force_path, frame_time, methods, squeeze, uncertainty, volume_history
+from studies.plots import (
+    accuracy,
+    cost_ratio,
+    force_path,
+    frame_time,
+    methods,
+    overview,
+    squeeze,
+    uncertainty,
+    volume_history,
+)
 from studies.plots import work_precision as work
 from studies.plots.campaigns import stability
 from studies.plots.style.page import UNRESOLVED_MARK, unresolved_notes
@@ -169,6 +180,18 @@ def test_a_ratio_that_cannot_be_resolved_is_grey_and_says_so():
     assert "not resolvable" in words(axes)
     assert points(axes, BLUE) == []
     assert points(axes, GREY)[0][2]
+
+
+@pytest.mark.parametrize("chart", [frame_time, cost_ratio, work, methods, overview])
+@pytest.mark.parametrize(("cpu", "marked"), [(0.97, False), (0.8, True)])
+def test_times_name_the_processor_and_are_marked_without_a_spread_where_the_program_waited(chart, cpu, marked):
+    pair = [run(frame_ms=ms, cpu=cpu, method=method) for ms, method in ((1.0, Free()), (1.25, ImplicitVolume()))]
+    figure = chart.figure(pair)
+    said = " ".join(text.get_text().replace("\n", " ") for text in figure.findobj(Text))
+    assert "Z80" in said and f"{100 * cpu:.0f} %" in said
+    assert ("disturbed the timing" in said) == marked and ("¶" in said) == marked
+    if chart is cost_ratio:
+        assert ("1.25  (1.25 to 1.25)" in said) == (not marked)
 
 
 def test_stability_shows_every_status_by_marker_and_colour_and_the_limit():

@@ -1,13 +1,13 @@
 """Tables for README and docs: the recommended body, its numbers, and the mark of one that misses the target."""
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from massspring.body.quadratic import boundary_facets, parts_of_facets
 from studies.meshing.true_surface import ShapeErrors
+from studies.metrics.timing.protocol import FrameTiming
 from studies.report.summary import ladder_of, recommended_of
 from studies.runs.recipes import QuadraticBody, SurfaceBody
 from studies.scene.library.spleen_sag import SPLEEN_SAG
@@ -32,14 +32,15 @@ def six_node_parts():
     return number[parts_of_facets(boundary_facets(cells))]
 
 
-def run(body, deviation, *, uncertainty=FLOORS, shape=KEPT, **changes):
+def run(body, deviation, *, uncertainty=FLOORS, shape=KEPT, cpu=None, **changes):
     """A body whose force is off by `deviation` and whose displacement is right; a frame is a second."""
     truth = made_up_run.reference()
     truth.total_uncertainty = dict.fromkeys(truth.total_uncertainty, uncertainty)
     force = np.array([0.5, 1.0, 1.5, 2.0]) * (1.0 + deviation)
     values = {"triangles": six_node_parts()} if body.kind == "quadratic" else {}
     made = made_up_run.run(force=force, reference=truth, attributes={"volumes": 7}, values=values, **changes)
-    timing = SimpleNamespace(frame_ns=np.full((3, 4), FRAME_NS[body]))
+    times = np.full((3, 4), FRAME_NS[body])
+    timing = FrameTiming(times, cpu_ns=None if cpu is None else cpu * times, processor="" if cpu is None else "Z80")
     made = replace(made, case=replace(made.case, body=body, dt_fraction=0.8), timing=timing)
     vars(made)["shape"] = shape  # a cube is no ball
     return made
@@ -55,6 +56,12 @@ def test_the_cheapest_body_that_suffices_stands_beside_the_papers():
         "| ball_clamped | −70.0 ± 0.1 | 0.0 ± 0.1 "
         "| quadratic, masses by stiffness, 594, 0.8 | −2.0 ± 0.1 | 0.0 ± 0.1 | 0.42 | −0.13 | 10 |"
     )
+
+
+@pytest.mark.parametrize(("cpu", "cell"), [(0.95, "| 10 (10.5) |"), (0.8, "| 10 (12.5) ¶ |")])
+def test_a_time_stands_beside_that_of_the_processor_and_is_marked_where_it_waited(cpu, cell):
+    row, *notes = (line for line in recommended_of(runs(cpu=cpu)).splitlines()[2:] if line)
+    assert row.endswith(cell) and "Z80" in notes[0] and [note[0] for note in notes[1:]] == ["¶"] * (cpu < 0.9)
 
 
 @pytest.mark.parametrize(("body", "deviation", "uncertainty"), [(EVEN, -0.05, FLOORS), (GRADED, 0.01, 0.2)])

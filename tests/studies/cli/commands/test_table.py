@@ -4,9 +4,9 @@ import pytest
 
 from massspring import ImplicitVolume, Xpbd
 from studies.cli.commands import table
-from studies.metrics.cells import FEW_MARK, FEW_NOTE, UNCONVERGED_NOTE, value_cell
+from studies.metrics.cells import DISTURBED_MARK, DISTURBED_NOTE, FEW_MARK, FEW_NOTE, UNCONVERGED_NOTE, value_cell
 from studies.metrics.metrics import METRICS
-from studies.metrics.table import FEW_FACETS, UNRESOLVED, row_of
+from studies.metrics.table import DISTURBED, FEW_FACETS, PROCESSOR, UNRESOLVED, row_of
 from studies.report.page.markup import table as page_table
 from studies.report.summary import results_of
 from studies.scene.library import BALL_CLAMPED
@@ -87,6 +87,12 @@ def test_a_row_with_few_facets_is_marked(capsys):
     assert FEW_NOTE in out
     table.draw([row()], CHOSEN, False)
     assert FEW_MARK not in capsys.readouterr().out
+
+
+def test_a_time_names_its_processor_and_is_marked_where_it_was_disturbed(capsys):
+    table.draw([row(**{DISTURBED: "it waited", PROCESSOR: "Z80"}), row(**{PROCESSOR: "Z80"})], CHOSEN, False)
+    out = capsys.readouterr().out
+    assert out.count(DISTURBED_MARK) == 2 and DISTURBED_NOTE in out and "processor: Z80\n" in out
 
 
 def test_a_method_that_does_not_converge_is_marked_in_every_table(capsys):

@@ -2,17 +2,18 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from massspring import Free, simulate
 from studies.base.errors import StudyError
 from studies.metrics.timing import cases as module
-from studies.metrics.timing.cases import time_cases, timing_file
+from studies.metrics.timing.cases import time_cases, timing_file, timing_of
 from studies.runs.current import case_path
 from studies.runs.prepare import prepare
 from studies.store import ledger
 from studies.store.entry import CODE_CHANGED, MISSING
-from studies.store.machine import machine_id
+from studies.store.machine import machine_id, this_machine
 from studies.store.record import Status, read_record, write_record
 from studies.sweep import job as jobs_module
 from studies.sweep.load import frame_times
@@ -28,6 +29,12 @@ def test_a_file_beside_the_physics_holds_frames_and_stages(results):
     assert (record.kind, record.status, record.key) == ("timing", Status.OK, KEPT.key)
     assert record.fields["frame_ns"].values.shape == (module.REPEATS, FRAMES)
     assert record.fields["frame_ns"].unit == "ns" and record.attributes["threads"] == 1
+    wall, own = (record.fields[name].values for name in ("frame_ns", "cpu_ns"))
+    assert own.shape == wall.shape and 0 < own.sum() < 1.5 * wall.sum()  # both are of the same spans
+    assert record.attributes["processor"] == this_machine().cpu
+    read, copied = timing_of(record), ("core", "threads", "others", "processor", "disturbed")
+    assert {name: getattr(read, name) for name in copied} == {name: record.attributes.get(name) for name in copied}
+    assert np.array_equal(read.cpu_ns, own)
     assert "frame_ns" not in read_record(physics).fields
     stages, times = record.fields["stages"].values.tolist(), record.fields["stage_ns"].values
     assert times.shape == (len(stages), FRAMES) and (times >= 0).all()

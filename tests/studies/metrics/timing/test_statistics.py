@@ -2,7 +2,14 @@ import numpy as np
 import pytest
 
 from studies.base.errors import StudyError
-from studies.metrics.timing.statistics import _sign_test_rank, kernel_ns, missed, percentiles, ratio_with_spread
+from studies.metrics.timing.statistics import (
+    _sign_test_rank,
+    disturbance,
+    kernel_ns,
+    missed,
+    percentiles,
+    ratio_with_spread,
+)
 
 
 def test_percentiles_are_times_that_frames_took():
@@ -56,3 +63,19 @@ def test_equal_contestants_rarely_differ():
 def test_repeats_that_cannot_be_paired_are_refused():
     with pytest.raises(StudyError, match="there are 3 and 4"):
         ratio_with_spread(np.ones((3, 2)), np.ones((4, 2)))
+
+
+@pytest.mark.parametrize(
+    ("own", "others", "why"),
+    [
+        ((9.5, 9.1), 0.09, ""),
+        ((9.5, 8.8), 0.0, "the program waited 12 % of a repeat"),
+        ((9.5, 9.5), 0.25, "other processes took 25 % of the processors"),
+        ((9.5, 5.0), 0.25, "the program waited 50 % of a repeat, other processes took 25 % of the processors"),
+        (None, None, ""),
+    ],
+)
+def test_a_timing_is_disturbed_where_a_repeat_waited_or_others_had_the_processors(own, others, why):
+    """Two repeats of 10 ns, in two frames of which one waits."""
+    cpu_ns = None if own is None else np.array([[1.0, repeat - 1.0] for repeat in own])
+    assert disturbance(np.array([[1.0, 9.0], [1.0, 9.0]]), cpu_ns, others) == why

@@ -6,7 +6,7 @@ import pytest
 
 from massspring import Free
 from studies.meshing.true_surface import ShapeErrors
-from studies.report.page.best import answers, best_bodies, joined_best, own_first
+from studies.report.page.best import answers, best_bodies, joined_best, own_first, scene_rows
 from studies.scene.library import BALL_CLAMPED, LIVER_PRESS
 from tests.studies.plots.made_up import run
 
@@ -77,3 +77,12 @@ def test_a_body_without_an_error_is_not_named():
     for made in (good(with_reference=False), good(method=Free()), diverged):
         assert best_bodies([made], named) == []
     assert answers([]) == {}
+
+
+@pytest.mark.parametrize(("cpu", "mark"), [(0.98, ""), (0.5, " ¶")])
+def test_speeds_are_of_wall_and_of_processor_time_of_a_named_processor(cpu, mark):
+    best = best_bodies([good(cpu=cpu)], named)
+    speed, own = scene_rows(best)[0]["rows"][0]["numbers"][-2:]
+    assert float(own.split()[0]) == pytest.approx(0.2 / (0.0102 * cpu), rel=0.02)
+    assert speed.endswith(mark) and (" ± " in speed) == (" ± " in own) == (not mark)
+    assert f"on one core of Z80{mark}." in answers(best)["How fast?"]
