@@ -133,7 +133,8 @@ def timing_notes(runs: Sequence[Run]) -> list[str]:
     timed = [(run, run.timing) for run in runs if run.timing is not None]
     names = ", ".join(dict.fromkeys(timing.processor for _, timing in timed if timing.processor))
     shares = [100 * own.sum() / timing.frame_ns.sum() for _, timing in timed if (own := timing.cpu_ns) is not None]
-    notes = [f"Wall times of {names}; processor time is {min(shares):.0f} to {max(shares):.0f} %."] if shares else []
+    ends = f"{min(shares):.0f} to {max(shares):.0f} %" if shares else ""
+    notes = [f"Wall times of {names}; processor time is {ends} of them."] if shares else []
     disturbed = [run.case.name for run, timing in timed if timing.disturbed]
     if disturbed:
         more = f" and {len(disturbed) - MOST_NAMED} more" if len(disturbed) > MOST_NAMED else ""
