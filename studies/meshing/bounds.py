@@ -3,6 +3,15 @@ warning."""
 
 SHAPE, SHAPE_VOLUME = 1.0, 0.5
 """Bounds of shape_error and |shape_volume| [%]. A body that exceeds one of them is never recommended."""
+
+
+def enough(nodes: int, worst: float) -> int:
+    """Surface nodes with which a body of `nodes` that exceeds a bound of the shape by the factor `worst` keeps it: the
+    errors fall at least as 1 over the nodes (a real liver: 3.05, 1.97 and 0.5 % with 1,194, 1,594 and 2,390)."""
+    step = 10 ** (len(str(int(nodes * worst))) - 2)
+    return int(-(-nodes * worst // step) * step)
+
+
 REFERENCE_SHAPE = 0.5
 """Bound of shape_error of the finest mesh of a reference [%]. One beyond it is named: its uncertainty does not contain
 what that does to an error."""

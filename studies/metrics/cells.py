@@ -2,7 +2,8 @@
 
 import math
 
-from studies.meshing.bounds import FEW
+from studies.meshing.bounds import FEW, SHAPE, SHAPE_VOLUME
+from studies.metrics.wish import HOLLOW, SOLID
 
 MISSING = "–"
 UNRESOLVED_MARK = "†"
@@ -18,21 +19,32 @@ UNCONVERGED_NOTE = (
     f"{UNCONVERGED_MARK} not converged: the answer depends on the step and on the order of elements, which ± does not "
     "contain"
 )
+MISSED_MARK = "*"
+MISSED_NOTE = (
+    f"{MISSED_MARK} misses the target: force within {SOLID[0]:g} %, mean displacement within {SOLID[1]:g} % (hollow "
+    f"organs {HOLLOW[0]:g} and {HOLLOW[1]:g} %), shape within {SHAPE:g} % of the size, its volume within "
+    f"{SHAPE_VOLUME:g} %"
+)
 MINUS = "−"
 
 
 def value_cell(
-    value: float, uncertainty: float = float("nan"), *, signed: bool = False, unresolved: bool = False
+    value: float,
+    uncertainty: float = float("nan"),
+    *,
+    signed: bool = False,
+    unresolved: bool = False,
+    missed: bool = False,
 ) -> str:
-    """ "−50.8 ± 0.2 †": as many digits as its `uncertainty` has; three without one; a dash for NaN."""
+    """ "−50.8 ± 0.2 † *": as many digits as its `uncertainty` has; three without one; a dash for NaN."""
     if value != value:
         return MISSING
-    sign = "+" if signed else ""
+    sign, miss = "+" if signed else "", f" {MISSED_MARK}" if missed else ""
     if not uncertainty > 0:
-        return plain(value, sign)
+        return plain(value, sign) + miss
     digits = max(0, -math.floor(math.log10(uncertainty)))
     mark = f" {UNRESOLVED_MARK}" if unresolved else ""
-    return f"{value:{sign}.{digits}f} ± {uncertainty:.{digits}f}{mark}".replace("-", MINUS)
+    return f"{value:{sign}.{digits}f} ± {uncertainty:.{digits}f}{mark}{miss}".replace("-", MINUS)
 
 
 def plain(value: float, sign: str = "") -> str:

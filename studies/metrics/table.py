@@ -14,6 +14,7 @@ from studies.metrics.cells import (
     DISTURBED_NOTE,
     FEW_MARK,
     FEW_NOTE,
+    MISSED_NOTE,
     UNCONVERGED_MARK,
     UNCONVERGED_NOTE,
     UNRESOLVED_NOTE,
@@ -21,8 +22,10 @@ from studies.metrics.cells import (
 from studies.metrics.metric import Metric
 from studies.metrics.metrics import METRICS, few_facets
 from studies.metrics.run import Run
+from studies.metrics.wish import missed
 from studies.reference.uncertainty import QUANTITIES
 from studies.runs.recipe_text import recipe_text
+from studies.scene.scene import Scene
 
 Row = dict[str, Any]
 """Column name -> value."""
@@ -32,12 +35,14 @@ UNCONVERGED = "not converged"
 """Column with the reason why the answer of the method depends on the step and on the order of elements."""
 UNRESOLVED = "doubtful"
 """Column with the metrics whose value is less than ten times the uncertainty of the reference."""
+MISSES = "misses"
+"""Column with the metrics that miss the default target of the scene, or a bound of the shape."""
 FEW_FACETS = "few facets"
 """Column that says whether a sphere or capsule touches fewer than eight facets."""
 DISTURBED, PROCESSOR = "disturbed", "processor"
 """Columns of a table with times: why these are not those of the program alone, and the processor that they are of."""
 MARKS = {UNCONVERGED: UNCONVERGED_MARK, FEW_FACETS: FEW_MARK, DISTURBED: DISTURBED_MARK}
-NOTES = {UNRESOLVED: UNRESOLVED_NOTE, FEW_FACETS: FEW_NOTE, UNCONVERGED: UNCONVERGED_NOTE}
+NOTES = {MISSES: MISSED_NOTE, UNRESOLVED: UNRESOLVED_NOTE, FEW_FACETS: FEW_NOTE, UNCONVERGED: UNCONVERGED_NOTE}
 NOTES |= {DISTURBED: DISTURBED_NOTE}
 """Columns -> the mark of a row with something there, and what a table says of it."""
 
@@ -111,4 +116,10 @@ def row_of(run: Run, metrics: Sequence[Metric]) -> Row:
     timing = run.timing if any(entry.spread is not None for entry in metrics) else None
     row[DISTURBED], row[PROCESSOR] = ("", "") if timing is None else (timing.disturbed, timing.processor)
     row[UNRESOLVED] = " ".join(entry.name for entry in metrics if entry.unresolved(run))
-    return row
+    return row | misses(case.scene, row)
+
+
+def misses(scene: Scene, row: Mapping[str, Any]) -> Row:
+    """The column MISSES of a row."""
+    values = {name.removesuffix(" [%]"): value for name, value in row.items() if name.endswith(" [%]")}
+    return {MISSES: " ".join(missed(scene, values))}

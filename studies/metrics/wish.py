@@ -1,7 +1,9 @@
 """Accuracy targets, and the default target."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
+from studies.meshing.bounds import SHAPE, SHAPE_VOLUME
 from studies.scene.kind import has_wall
 from studies.scene.scene import Scene
 
@@ -30,3 +32,11 @@ class Wish:
 def usual_wish(scene: Scene) -> Wish:
     """Force within 3 %, displacement within 1 %; of a hollow organ 6 and 3 %."""
     return Wish().or_usual(scene)
+
+
+def missed(scene: Scene, values: Mapping[str, float]) -> list[str]:
+    """Of metrics [%] by name those that miss the default target of the scene, or a bound of the shape."""
+    wish = usual_wish(scene)
+    bounds = {"force_end": wish.force, "mean_error": wish.displacement}
+    bounds |= {"shape_error": SHAPE, "shape_volume": SHAPE_VOLUME}
+    return [name for name, value in values.items() if (bound := bounds.get(name)) is not None and abs(value) > bound]

@@ -44,7 +44,7 @@ SCENE = Scene(
     held=(Held("end", {hold}),),
 {lumen}    probed=ForceOutput("obstacle", 0, INWARD),
     damping=8.0,
-    reference=ReferencePlan(),
+    reference={reference},
 )
 CASES = (
 {recommended}    # {kept}: quick, but inaccurate (docs/findings.md, the paper's body).
@@ -93,11 +93,12 @@ def scene_text(
     nodes: int,
     recommended: Recommended | None,
     folder: Path,
+    reference: str = "ReferencePlan()",
 ) -> str:
     """A Python file, in `folder`, that defines SCENE and STUDY for the organ in a file.
 
     organ: parameters of Organ("file"), see organ_options; tissue: a name of TISSUES; nodes: of the body of one volume;
-    recommended: a better body, None if none is known."""
+    recommended: a better body, None if none is known; reference: its plan, as Python."""
     path = Path(str(organ["path"]))
     given = {key: json.dumps(value) if isinstance(value, str) else repr(value) for key, value in organ.items()}
     entries = ", ".join(f'"{key}": {text}' for key, text in (given | {"path": "str(FILE)"}).items())
@@ -128,6 +129,7 @@ def scene_text(
         ),
         nodes=nodes,
         missing=missing,
+        reference=reference,
         kept="Wall and content as two volumes" if hollow else "One volume, which the paper keeps",
         bodies=", ".join(sorted(bodies)),
         recommended=second,

@@ -12,9 +12,10 @@ from studies.exchange.judge import judge as judged
 from studies.exchange.judge import judged_path
 from studies.exchange.league import LEAGUE, check_entry, read_entry_file
 from studies.exchange.meshes import NODES
-from studies.metrics.cells import UNRESOLVED_NOTE, plain, value_cell
+from studies.metrics.cells import MISSED_MARK, MISSED_NOTE, UNRESOLVED_NOTE, plain, value_cell
 from studies.metrics.judged import FORCE
 from studies.metrics.run import Run
+from studies.metrics.wish import missed
 from studies.report.results import report_entry
 from studies.scene.quantities import ALWAYS
 from studies.store.ledger import Ledger
@@ -75,8 +76,9 @@ def hints_of(run: Run) -> list[str]:
 
 
 def lines_of(run: Run) -> list[str]:
-    lines, marked = [], False
-    for metric in judged_metrics(run.case.scene):
+    lines, marked, metrics = [], False, judged_metrics(run.case.scene)
+    misses = missed(run.case.scene, {metric.name: metric(run) for metric in metrics})
+    for metric in metrics:
         value = metric(run)
         if value != value:
             continue
@@ -84,5 +86,6 @@ def lines_of(run: Run) -> list[str]:
         unresolved = metric.unresolved(run)
         marked |= unresolved
         shown = value_cell(value, uncertainty, signed=metric.better == "-", unresolved=unresolved)
-        lines.append(f"  {metric.name:18} {shown} {metric.unit}".removesuffix(" 1"))
-    return [*lines, UNRESOLVED_NOTE] if marked else lines
+        miss = f" {MISSED_MARK}" if metric.name in misses else ""
+        lines.append(f"  {metric.name:18} {shown} {metric.unit}".removesuffix(" 1") + miss)
+    return lines + [UNRESOLVED_NOTE] * marked + [MISSED_NOTE] * bool(misses)

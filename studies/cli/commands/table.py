@@ -14,7 +14,7 @@ from studies.exchange.entry import entries_beside
 from studies.metrics.cells import MISSING, plain, value_cell
 from studies.metrics.metric import Metric
 from studies.metrics.metrics import METRICS
-from studies.metrics.table import NOTES, PROCESSOR, UNRESOLVED, frame_of, marked, row_of
+from studies.metrics.table import MISSES, NOTES, PROCESSOR, UNRESOLVED, frame_of, marked, row_of
 from studies.metrics.table import metric as metric_of
 from studies.scene.quantities import ALWAYS
 from studies.store.entry import DAMAGED
@@ -140,7 +140,11 @@ def cell(row: Row, metric: Metric) -> str:
     """A metric of a row with its uncertainty; a volume is compared with the body's own, which is known."""
     has_floor = metric.quantity is not None and metric.quantity not in ALWAYS
     uncertainty = float(row.get(f"{metric.name} floor [{metric.unit}]", "nan")) if has_floor else float("nan")
-    unresolved = metric.name in str(row[UNRESOLVED]).split()
+    unresolved, misses = (metric.name in str(row[column]).split() for column in (UNRESOLVED, MISSES))
     return value_cell(
-        float(row[f"{metric.name} [{metric.unit}]"]), uncertainty, signed=metric.better == "-", unresolved=unresolved
+        float(row[f"{metric.name} [{metric.unit}]"]),
+        uncertainty,
+        signed=metric.better == "-",
+        unresolved=unresolved,
+        missed=misses,
     )

@@ -6,11 +6,11 @@ from typing import Any
 
 from studies.base.counting import counted, readable
 from studies.exchange.entry import sides_of
-from studies.meshing.bounds import SHAPE, SHAPE_VOLUME
+from studies.meshing.bounds import REFERENCE_SHAPE, SHAPE, SHAPE_VOLUME, enough
 from studies.metrics.cells import DISTURBED_MARK, MISSING, plain, value_cell
 from studies.metrics.judged import Judged, Measured, by_cost
 from studies.metrics.run import Run
-from studies.metrics.table import DISTURBED, PROCESSOR
+from studies.metrics.table import DISTURBED, OFF_SHAPE, PROCESSOR
 from studies.metrics.wish import Wish, usual_wish
 from studies.report.summary import PAPER, choice_of, compared_bodies, paper_body
 from studies.runs.case import Case
@@ -115,7 +115,9 @@ def joined_best(parts: Sequence[Sequence[Best]], rows: Sequence[Mapping[str, Any
         chosen = min(group, key=lambda row: row["order"])
         paper = next((row["paper"] for row in group if row["paper"]), None)
         entries = [entry for row in group for entry in row.get("entries", ())]
+        off = [row.get(OFF_SHAPE) for row in rows if row["scene"] == chosen["scene"]]
         best.append(_timed(chosen, times) | {"paper": _timed(paper, times) if paper else None, "entries": entries})
+        best[-1]["reference"] = max(filter(None, off), default=None)
     return best
 
 
@@ -144,9 +146,9 @@ def answers(best: Sequence[Best], own: Collection[str] = (), shown: str | None =
     if not best:
         return theirs
     papers = [row["paper"] for row in best if row["paper"]]
-    lost = "; ".join(words for row in best if (words := _missing(row)))
+    lost = "; ".join(words for row in best for words in _missing(row))
     return (
-        ({"What is missing?": f"{lost}: use more nodes."} if lost else {})
+        ({"What is missing?": f"{_capital(lost)}."} if lost else {})
         | theirs
         | {
             "Which body?": _which(best),
@@ -166,14 +168,23 @@ def _near(row: Best, entry: Best) -> str:
     return f"{where}: {_errors([entry])}. It {verdict} ({row['target']}).{rank}"
 
 
-def _missing(row: Best) -> str:
-    """What the body of a row lacks of the shape of its organ; "" if it keeps the bounds, or if that is not known."""
+def _missing(row: Best) -> list[str]:
+    """What the best body of a row and its reference lack of the shape of the organ, and how many nodes would do; empty
+    if they keep the bounds, or if that is not known."""
     (shape, _), (volume, _) = (row.get(name) or (0.0, 0.0) for name in ("shape", "volume"))
-    if shape <= SHAPE and abs(volume) <= SHAPE_VOLUME:
-        return ""
-    allowed = f"allowed: {SHAPE:g} and {SHAPE_VOLUME:g} %"
-    off = f"up to {plain(float(f'{shape:.2g}'))} % of the size off its organ, volume {volume:+.2g} % ({allowed})"
-    return f"in {readable(row['scene'])} the best body is {off}"
+    worst, lost = max(shape / SHAPE, abs(volume) / SHAPE_VOLUME), []
+    if worst > 1.0:
+        off = f"up to {plain(float(f'{shape:.2g}'))} % of the size off its organ, volume {volume:+.2g} %"
+        allowed = f"allowed: {SHAPE:g} and {SHAPE_VOLUME:g} %"
+        nodes = enough(int(row["body"].rsplit(", ", 2)[1]), worst)
+        lost = [f"in {readable(row['scene'])} the best body is {off} ({allowed}); about {nodes:,} nodes would do"]
+    off = row.get("reference") or 0.0
+    if off > REFERENCE_SHAPE:
+        lost.append(
+            f"the reference of {readable(row['scene'])} is up to {off:.2g} % of the size off its organ (allowed: "
+            f"{REFERENCE_SHAPE:g} %), which ± does not contain; give its plan a larger base"
+        )
+    return lost
 
 
 def _which(best: Sequence[Best]) -> str:

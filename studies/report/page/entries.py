@@ -14,7 +14,7 @@ from studies.catalog.study import Chart, Study
 from studies.exchange.entry import FOLDER, entries_beside, entry_files, run_of_entry
 from studies.metrics.judged import Judged, judged, over_meshes
 from studies.metrics.run import by_scene
-from studies.metrics.table import study_table
+from studies.metrics.table import misses, study_table
 from studies.metrics.wish import usual_wish
 from studies.plots.style.style import save, svg_copies
 from studies.plots.work_precision import figure_of
@@ -91,5 +91,6 @@ def _others(root: Path, scene: Scene) -> tuple[list[Judged], list[dict[str, Any]
         stored = stored_of_user(root, scene)
         return ([] if stored is None else stored.cases[scene.name]), []
     wish, rows = usual_wish(scene), published_table(published_for(root), scene, study.name)
-    published = [row | {"case": case_id(one.case), "published": True, NEAR: one.worst(wish)} for row, one in rows]
+    shown = [(row | misses(scene, row), one) for row, one in rows]
+    published = [row | {"case": case_id(one.case), "published": True, NEAR: one.worst(wish)} for row, one in shown]
     return over_meshes(one for row, one in rows if row["status"] == Status.OK and one.compared), published

@@ -12,7 +12,7 @@ from studies.base.counting import heading, readable
 from studies.meshing.bounds import REFERENCE_SHAPE
 from studies.metrics.cells import MISSING, plain, value_cell
 from studies.metrics.metrics import METRICS
-from studies.metrics.table import OFF_SHAPE, UNRESOLVED, marked
+from studies.metrics.table import MISSES, OFF_SHAPE, UNRESOLVED, marked
 from studies.report.page.svg import inline
 
 ASSETS = Path(__file__).parent / "assets"
@@ -132,7 +132,8 @@ def _metric_cell(row: Mapping[str, Any], metric: Any) -> Cell:
     doubtful = metric.name in str(row.get(UNRESOLVED) or "").split()
     # A volume is compared with the rest volume of the body, so the uncertainty of the reference does not apply.
     uncertainty = float("nan") if floor is None or metric.name == "volume_worst" else float(floor)
-    cell = value_cell(float(value), uncertainty, signed=metric.name in SIGNED, unresolved=doubtful)
+    misses = metric.name in str(row.get(MISSES) or "").split()
+    cell = value_cell(float(value), uncertainty, signed=metric.name in SIGNED, unresolved=doubtful, missed=misses)
     return "number", f"{abs(float(value)):.6g}", cell
 
 

@@ -18,6 +18,7 @@ from studies.base.atomic import write_whole
 from studies.base.counting import counted
 from studies.base.errors import StudyError
 from studies.catalog.study import RESERVED, Study, command_line
+from studies.metrics.cells import MISSED_NOTE
 from studies.report.page.best import HEADS, answers, joined_best, own_first, scene_rows
 from studies.report.page.case_data import merged
 from studies.report.page.markup import ASSETS, TEMPLATES, machine_words, script_json, table, tabs
@@ -206,6 +207,7 @@ def page(
         ],
         machine=machine_words(machine),
         league=league,
+        missed=MISSED_NOTE,
         data=Markup(script_json(data)),
         script=Markup(script),
         digest=base64.b64encode(sha256(script.encode()).digest()).decode("ascii"),

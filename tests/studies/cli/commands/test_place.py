@@ -10,10 +10,11 @@ import meshio
 import numpy as np
 import pytest
 
+from studies.cli.commands import place
 from studies.geometry import organ, read_mesh
 from studies.meshing.rest_surface import rest_surfaces
 from studies.meshing.scene_mesh import mesh_for
-from studies.meshing.true_surface import shape_errors
+from studies.meshing.true_surface import ShapeErrors, shape_errors
 from studies.runs.prepare import mesh_of
 from studies.runs.recipes import TetrahedralBody
 from studies.scene.chosen_place import DEPTH
@@ -144,9 +145,30 @@ def test_a_scene_file_holds_the_tissue_the_hold_and_the_advised_body(organbench,
     assert (two.body, two.dt_fraction) == (case.body, case.dt_fraction) and two.timed
     shape = shape_errors(two.scene.organ, facets_at_rest(two), True)
     assert shape.worst < 1.0 and f"it is {shape} (allowed" in out
+    assert re.search(rf"\n  volume: file [\d.]+ mL, body [\d.]+ mL \({100 * shape.volume:+.3f} %\)\n", out)
     assert one.body == TetrahedralBody(nodes=200) and [case.recorded for case in study.cases] == [("surface",)] * 2
     # What the estimate rests on.
     assert one.scene.reference == ReferencePlan()
+
+
+@pytest.mark.parametrize("shares", [(0.5,), (3.0, 2.0, 0.5), (3.0, 2.5, 2.0)])
+def test_thin_margins_ask_for_more_nodes_and_a_finer_reference(organbench, scan_file, monkeypatch, shares):
+    """Bodies that exceed the bound of the shape by known factors, one after the other."""
+    errors = iter([ShapeErrors(1e-2 * share, 0.0) for share in shares])
+    monkeypatch.setattr(place, "mesh_of", lambda scene, body: mesh_for(scene, 150))
+    monkeypatch.setattr(place, "shape_errors", lambda *_, **__: next(errors))
+    code, out, err = organbench("place", "scan.ply", "--unit", "mm", "--close-holes", "--tissue", "kidney")
+    assert code == 0
+    case = loaded(scan_file.parent / "scene.py").CASES[0]
+    first = supported(shipped(), case.scene, "kidney")[0].body.nodes
+    finer = [first, 10 * round(0.15 * first), 10 * round(0.15 * 10 * round(0.15 * first))][: len(shares)]
+    assert case.body.nodes == finer[-1] and "volume: file" in out
+    assert case.scene.reference.base == (270 if len(shares) == 1 else 1000)
+    minutes = int(re.search(r"takes about (\d+) minutes", out)[1])
+    assert minutes == 3 if len(shares) == 1 else minutes > 4
+    enough = re.search(r"about ([\d,]+) nodes would do", out)
+    assert ("part of the shape is missing" in err) == (shares[-1] > 1) == (enough is not None)
+    assert enough is None or 1.0 <= int(enough[1].replace(",", "")) / (shares[-1] * finer[-1]) < 1.1
 
 
 def facets_at_rest(case):

@@ -6,6 +6,7 @@ import pytest
 
 from massspring import Free
 from studies.meshing.true_surface import ShapeErrors
+from studies.metrics.table import OFF_SHAPE
 from studies.report.page.best import answers, best_bodies, joined_best, own_first, scene_rows
 from studies.scene.library import BALL_CLAMPED, LIVER_PRESS
 from tests.studies.plots.made_up import run
@@ -39,7 +40,16 @@ def test_a_body_beyond_the_bounds_of_the_shape_is_not_the_best():
 def test_what_is_missing_from_the_shape_stands_first():
     first, answer = next(iter(answers(best_bodies([good(distance=0.0197)], named)).items()))
     assert first == "What is missing?" and "up to 2 % of the size off its organ" in answer
+    assert "about 600 nodes would do" in answer  # 1.97 times 300
     assert next(iter(answers(best_bodies([good()], named)))) == "Which body?"
+
+
+def test_a_reference_off_the_shape_is_missing_too():
+    rows = [{"case": "", "scene": "liver_press", OFF_SHAPE: off} for off in (0.4, 2.5)]
+    for shown, words in ((rows[:1], "Which body?"), (rows, "What is missing?")):
+        given = answers(joined_best([best_bodies([good()], named)], shown))
+        assert next(iter(given)) == words
+    assert "the reference of liver press is up to 2.5 % of the size off" in given["What is missing?"].lower()
 
 
 def test_the_cheapest_body_within_the_target_stands_beside_the_papers_with_its_numbers():
@@ -68,7 +78,7 @@ def test_of_several_studies_the_best_body_counts_and_a_time_of_either():
     missed = best_bodies([good(error=0.2, frame_ms=1.0), paper()], named)
     (row,) = joined_best([slow, missed, quick], [])
     assert row["case"] == "tetrahedral-400-implicit_volume" and row["paper"]["speed"] is None
-    rows = [{"case": "surface-550-implicit_volume", "real_time [s/s]": 7.0, "real_time floor [s/s]": 0.5}]
+    rows = [{"case": "surface-550-implicit_volume", "scene": "", "real_time [s/s]": 7.0, "real_time floor [s/s]": 0.5}]
     assert joined_best([slow, missed, quick], rows)[0]["paper"]["speed"] == [7.0, 0.5]
 
 
