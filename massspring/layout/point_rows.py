@@ -40,6 +40,7 @@ def point_rows(body: Body, volumes: PointVolumes, inverse_mass: np.ndarray) -> P
         heavier=body.mass - body.moved_mass,
         area=aligned((blocks * POINTS * AREAS, BLOCK), REAL),
         stretch=aligned((blocks * POINTS, BLOCK), REAL),
+        most_squeezed=np.full((1, BLOCK), -np.inf),
         corner_pressure=aligned((blocks * CORNERS, BLOCK), REAL),
         corner_share=aligned((blocks * CORNERS, BLOCK), REAL),
         element_push=aligned((blocks * ROWS, BLOCK), REAL),

@@ -66,5 +66,9 @@ def begin_frame(state: State, boundary: BoundaryConditions) -> State:
     rows = state.rows
     if isinstance(rows, PointRows):
         touched = {name: getattr(rows.facets, name).copy() for name in REMEMBERED}
-        rows = rows._replace(eased=rows.eased.copy(), facets=rows.facets._replace(**touched))
+        rows = rows._replace(
+            eased=rows.eased.copy(),
+            facets=rows.facets._replace(**touched),
+            most_squeezed=np.full_like(rows.most_squeezed, -np.inf),
+        )
     return replace(state, nodes=nodes, rows=rows, diagnostics=diagnostics, probing=probing)

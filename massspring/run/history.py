@@ -6,6 +6,7 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from massspring.body.body import Body
+from massspring.kernels.points.arrays import PointRows
 from massspring.kernels.probe.arrays import COUNTS
 from massspring.layout.facet_rows import facet_rule
 from massspring.layout.probe_arrays import tip_depth
@@ -50,7 +51,8 @@ class History:
     held_force: np.ndarray
     """Force of each attachment on the body at the end of the frame [N], (F, g, 3)."""
     min_j: np.ndarray
-    """Smallest J of an element [1], (F,); NaN for a surface body."""
+    """Smallest J of an element [1], of quadratic ones at any step of the frame, of others at its end, (F,); NaN for a
+    surface body."""
     snapshot_frames: np.ndarray
     """Frame numbers, 1 … F, (s,)."""
     snapshots: np.ndarray
@@ -190,7 +192,8 @@ class Recorder:
         x = x if numbers is None else numbers.carried(x)
         self.volume[frame] = self.volumes.measure(x)
         self.pressure[frame] = state.lam if numbers is None else state.lam[numbers.volumes]
-        self.scalars["min_j"][frame] = self.body.smallest_ratio(x)
+        squeezed = state.rows.most_squeezed.max() if isinstance(state.rows, PointRows) else -np.inf
+        self.scalars["min_j"][frame] = min(self.body.smallest_ratio(x), 1.0 - squeezed)
         done = state.diagnostics
         self.contact_force[frame, self.rank] = self._at_end(done.contact_impulse, done.earlier_contact, steps)
         self.held_force[frame] = self._at_end(done.held_impulse, done.earlier_held, steps)

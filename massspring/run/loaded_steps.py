@@ -89,6 +89,7 @@ class LoadedSteps:
         those at rest."""
         rows, x, weight = state.rows, state.nodes.x, state.model.inverse_mass[:, None]
         assert isinstance(rows, PointRows)
+        rows = rows._replace(most_squeezed=np.full_like(rows.most_squeezed, -np.inf))  # nudges are no steps
         rows.lam[:] = lam + state.model.rest_lam
         begin, square = self._push(rows, x), 0.0
         for _ in range(count):

@@ -64,8 +64,8 @@ def tunnelling(inside: np.ndarray) -> str:
 
 
 def folding(min_j: np.ndarray, shaped: bool) -> tuple[Status, str]:
-    """Whether an element folds or inverts after any frame, by the least J after each (F,), NaN without elements (see
-    Body.smallest_ratio); and a sentence on it. What happens within a frame is not seen.
+    """Whether an element folds or inverts in any frame, by the least J of each (F,), NaN without elements (see
+    History.min_j); and a sentence on it. Of linear elements, what happens within a frame is not seen.
 
     shaped: whether the body starts in a shape other than at rest. It may then be folded on its way back, so only the
     last frame counts.
@@ -75,5 +75,5 @@ def folding(min_j: np.ndarray, shaped: bool) -> tuple[Status, str]:
     status, there = (Status.INVERTED, inverted) if inverted.any() else (Status.FOLDED, counted < FOLDED)
     if not there.any():
         return Status.OK, ""
-    where = "at the end" if shaped else f"after {there.sum()} of {len(there)} frames"
+    where = "at the end" if shaped else f"in {there.sum()} of {len(there)} frames"
     return status, f"an element is {status} {where} (least J {np.fmin.reduce(counted):.3g}; {FOLDED:g} is allowed)"

@@ -140,6 +140,8 @@ class PointRows(NamedTuple):
     """Scratch: w_q cof F_q ∇b_i of three corners [m²], (36 b, BLOCK)."""
     stretch: np.ndarray
     """Scratch: −b_q (J_q − 1) [Pa], (4 b, BLOCK)."""
+    most_squeezed: np.ndarray
+    """Largest 1 − J_q at a step of the frame so far, in each lane, (1, BLOCK)."""
     corner_pressure: np.ndarray
     """Scratch: the pressure of each corner's volume [Pa], (4 b, BLOCK)."""
     corner_share: np.ndarray

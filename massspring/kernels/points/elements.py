@@ -66,14 +66,15 @@ def bulk_at(rows, pressure):
 @njit_inlined
 def open_point(rows, block, q, pressure, between, lane):
     """A_i = W_j × W_k / 24 = w_q cof F_q ∇b_i of the positions in the tile into `area`, −b_q (J_q − 1) into `stretch`,
-    w_q J_q into the tile; b_q from the pressure of the point [Pa]."""
+    w_q J_q into the tile; b_q from the pressure of the point [Pa]. Notes the smallest J."""
     w1, w2, w3 = slopes(rows, between, lane)
     part, point = spread(1.0 / 24.0, rows.tile), block * POINTS + q
     a1, a2, a3 = times(part, cross(w2, w3)), times(part, cross(w3, w1)), times(part, cross(w1, w2))
     now = dot(w1, a1)
     stretch, tile = flat(rows.stretch, point, point + 1), flat(rows.tile, SUMS + q, SUMS + q + 1)
-    ratio = now * load(rows.per_weight, point, lane)
-    save(bulk_at(rows, pressure) * (spread(1, rows.tile) - ratio), stretch, lane)
+    squeezed = spread(1, rows.tile) - now * load(rows.per_weight, point, lane)
+    save(at_least(squeezed, load(rows.most_squeezed, 0, lane)), flat(rows.most_squeezed, 0, 1), lane)
+    save(bulk_at(rows, pressure) * squeezed, stretch, lane)
     save(now, tile, lane)
     area = flat(rows.area, AREAS * point, AREAS * (point + 1))
     save_three(a1, area, lane)

@@ -81,3 +81,27 @@ def test_a_force_is_that_of_its_moment_however_long_the_frame(quadratic, kind):
     forces = [h.held_force[:, -1] if kind == "pull" else h.contact_force[:, 0] for h in (coarse, fine)]
     size = np.abs(forces[1]).max()
     assert np.abs(forces[0][:8] - forces[1][19:160:20]).max() < 0.01 * size
+
+
+def test_least_j_is_that_of_all_steps_of_a_frame(quadratic):
+    """A plane presses and leaves within one frame, at whose end it has left."""
+    top, down = tuple(quadratic.rest[quadratic.rest[:, 2].argmax()]), (0.0, 0.0, -0.018)
+    way = Trajectory((0.0, SECONDS / 3.0, SECONDS / 2.0), ((0.0, 0.0, 0.0), down, (0.0, 0.0, 0.03)))
+    limit = step_limit(quadratic, 20.0)
+    one, many = (
+        simulate(
+            Setup(
+                quadratic,
+                ImplicitVolume(),
+                make_clock(3.0 * SECONDS, frames, SECONDS / 600, limit),
+                damping=20.0,
+                obstacles=(Plane(top, (0, 0, -1), way, "no_slip"),),
+                attachments=(low(quadratic),),
+            ),
+            snapshots=range(1, frames + 1),
+        )
+        for frames in (1, 1800)
+    )
+    at_ends = min(quadratic.smallest_ratio(x) for x in many.snapshots)
+    assert one.min_j[0] == pytest.approx(at_ends, abs=0.005)
+    assert at_ends < quadratic.smallest_ratio(one.final) - 0.1

@@ -106,7 +106,7 @@ def test_an_entry_that_folds_on_its_way_says_so(ours, tmp_path, height, status):
     x = ours.positions.copy()
     x[1] = ours.positions[0] * [1.0, 1.0, height]
     record = judged(ours.npz(tmp_path / "a.npz", positions=x)).record
-    assert record.status == status and f"after 1 of {len(x) - 1} frames (least J {height:g};" in record.message
+    assert record.status == status and f"in 1 of {len(x) - 1} frames (least J {height:g};" in record.message
 
 
 def test_without_its_reference_nothing_but_errors_is_left_out(organbench, ours, scene_file, tmp_path):

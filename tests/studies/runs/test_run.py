@@ -138,12 +138,12 @@ def test_an_element_that_folds_in_any_frame_counts(ended, start, least, status):
     for frame in (0, 2, FRAMES - 1):
         verdict, message = at_frames(ended, {frame: least}, start)
         assert verdict == status
-        assert (f"is {status} after 1 of {FRAMES} frames (least J {least:.3g};" in message) == (status != Status.OK)
+        assert (f"is {status} in 1 of {FRAMES} frames (least J {least:.3g};" in message) == (status != Status.OK)
 
 
 def test_of_folded_and_inverted_frames_the_inverted_count(ended):
     verdict, message = at_frames(ended, {0: 0.05, 1: -0.2, 3: -0.4})
-    assert verdict == Status.INVERTED and f"after 2 of {FRAMES} frames (least J -0.4;" in message
+    assert verdict == Status.INVERTED and f"in 2 of {FRAMES} frames (least J -0.4;" in message
 
 
 @pytest.mark.parametrize(("least", "status"), FOLDS)
