@@ -39,7 +39,7 @@ from massspring.world.obstacles import Attachment
 class SemiImplicit(Method):
     """Implicit-explicit Euler for quadratic bodies: springs implicit by one constant matrix, volumes by HCJ05."""
 
-    tolerance: float = 1e-6
+    tolerance: float = 1e-5
     """Volume error that an iterative solve may leave, over the volume [1]."""
     most_iterations: int = 200
 

@@ -103,7 +103,7 @@ def add_response(model, nodes, rows, implicit, dt):
 
 @njit_lean
 def solve_iteratively(frame, rows, implicit, most, pairs=None):
-    """lam += S⁻¹ rhs by conjugate gradients (eq. 8.4).
+    """lam += S⁻¹ rhs by conjugate gradients (eq. 8.4), and adds the forces of the change to `rows.push`.
 
     Ends when |rhs − S Δlam|_r ≤ allowed_r for every volume, or after `most` iterations; returns their number. A volume
     with a diagonal of 0 cannot be corrected and is left out.
@@ -123,7 +123,10 @@ def solve_iteratively(frame, rows, implicit, most, pairs=None):
         curvature = inner_product(search, image)
         if not curvature > 0.0:
             break
-        along(search, image, rho / curvature, rows.lam, residual)
+        alpha = rho / curvature
+        along(search, image, alpha, rows.lam, residual)
+        for i in range(rows.push.shape[0]):
+            add_to(rows.push, i, times(alpha, row(rows.field, i)))
         before = rho
         iteration += 1
     return iteration

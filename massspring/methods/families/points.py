@@ -122,8 +122,6 @@ def keep_volumes(frame, step, rows, implicit, accuracy, push, passes, pairs):
         limited, idle = set_right_side(frame, rows, implicit, target, accuracy.tolerance, pairs)
         count = solve_iteratively(frame, rows, implicit, accuracy.most_iterations, pairs)
         count_iterations(frame.diagnostics, count)
-        if count > 0:
-            push_into(rows, rows.lam)
         if contacts_stand(frame, step, push, math.inf, sweep + 1 == passes, pairs):
             break
     return limited, idle
