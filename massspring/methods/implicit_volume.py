@@ -178,8 +178,8 @@ class ImplicitVolume(Method):
     """Keeps each volume with one multiplier (HCJ05): one volume by a division, more by a small solve per step."""
 
     tolerance: float = 1e-5
-    """Volume error that an iterative solve may leave, over the volume [1]: errors do not add up, as a step corrects what
-    the one before has left, and a kept volume may have thirty times as much."""
+    """Volume error that an iterative solve may leave, over the volume [1]: a thirtieth of what a kept volume may have,
+    and the next step corrects it."""
     most_iterations: int = 200
     recovers: bool = False
     """Whether a body with several volumes recovers from a start that is inverted, flat or arbitrary: meanwhile it has
