@@ -1,6 +1,7 @@
 """A member of a population: an organ of its own under a load of its own: palpated, filled, hanging, or squeezed."""
 
 import zlib
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import cache
 
@@ -139,38 +140,45 @@ def _hanging(scene: Scene, acceleration: float) -> Scene:
 def _squeezed(scene: Scene, shape: Shape, rng: np.random.Generator) -> Scene:
     """A member between two planes that take a share of its thickness, each one half, along a direction in which they
     stay clear of what is held. Raises StudyError where none is found."""
-    share, surface = float(rng.uniform(*SQUEEZE)), _surface(shape)
+    share, surface, end = float(rng.uniform(*SQUEEZE)), _surface(shape), PRESSED * scene.duration
     held = surface[np.any([held.region.level(surface) <= 0.0 for held in scene.held], axis=0)]
-    ways = rng.normal(size=(DIRECTIONS, 3))
-    axes = np.round(ways / np.linalg.norm(ways, axis=1, keepdims=True), 9)  # as _rounded
-    reach, taken = surface @ axes.T, held @ axes.T
-    lowest, highest = reach.min(axis=0).round(5), reach.max(axis=0).round(5)
-    travel = (0.5 * share * (highest - lowest)).round(5)
-    clear = np.minimum(taken.min(axis=0) - lowest, highest - taken.max(axis=0)) - travel >= CLEAR
-    if not clear.any():
+    planes = closing(surface, held, share, rng, end)
+    if not planes:
         raise StudyError(f"member {scene.name}: no direction in which planes clear of what is held take {share:.0%}")
-    first = int(clear.argmax())
-    axis, low, high, deep = (axes[first], *(float(some[first]) for some in (lowest, highest, travel)))
-    end, inward = PRESSED * scene.duration, (_rounded(axis), _rounded(-axis))
-    planes = tuple(
-        Plane(
-            scaled(towards, start - BESIDE),
-            towards,
-            Trajectory((0.0, end), ((0.0, 0.0, 0.0), scaled(towards, deep + BESIDE))),
-        )
-        for towards, start in zip(inward, (low, -high), strict=True)
-    )
     return replace(
         scene,
         title=f"A {scene.organ.shape} of a population, squeezed by {100 * share:.0f} % between two planes",
         checkpoints=press_times(0.0, end, CHECKPOINTS, scene.duration),
         obstacles=planes,
-        probed=ForceOutput("obstacle", 0, inward[0]),
+        probed=ForceOutput("obstacle", 0, planes[0].normal),
         lumen=None if scene.lumen is None else Lumen(),
         gravity=(0.0, 0.0, 0.0),
         damping=LIGHT,
         quantities=ALL,
         not_for=(),
+    )
+
+
+def closing(
+    surface: np.ndarray, held: np.ndarray, share: float, rng: np.random.Generator, end: float, count: int = 2
+) -> tuple[Plane, ...]:
+    """`count` planes that together take a share of the thickness of `surface` (n, 3) [m] until `end` [s], in the first
+    random direction in which they stay clear of the points `held` (m, 3) [m]; none where there is no such."""
+    ways = rng.normal(size=(DIRECTIONS, 3))
+    axes = np.round(ways / np.linalg.norm(ways, axis=1, keepdims=True), 9)  # as rounded
+    reach, taken = surface @ axes.T, held @ axes.T
+    lowest, highest = reach.min(axis=0).round(5), reach.max(axis=0).round(5)
+    travel = (share / count * (highest - lowest)).round(5)
+    room = np.stack([taken.min(axis=0) - lowest, highest - taken.max(axis=0)])[:count]
+    clear = np.flatnonzero(room.min(axis=0) - travel >= CLEAR)
+    if not len(clear):
+        return ()
+    axis, low, high, deep = (some[clear[0]] for some in (axes, lowest, highest, travel))
+    ends = ((rounded(axis), float(low)), (rounded(-axis), -float(high)))
+    way = float(deep) + BESIDE
+    return tuple(
+        Plane(scaled(inward, start - BESIDE), inward, Trajectory((0.0, end), ((0.0, 0.0, 0.0), scaled(inward, way))))
+        for inward, start in ends[:count]
     )
 
 
@@ -195,11 +203,11 @@ def _palpated(
         except StudyError:  # too far from the surface to be brought onto it
             continue
         if _able(shape, point, radius, depth):
-            return PalpationPoint(_rounded(point.point), _rounded(point.normal))
+            return PalpationPoint(rounded(point.point), rounded(point.normal))
     return None
 
 
-def _rounded(vector: Vector) -> Vector:
+def rounded(vector: Iterable[float]) -> Vector:
     """To a nanometre: the last bits of Newton's method are another on another machine, and a scene is its numbers."""
     x, y, z = (round(value, 9) for value in vector)
     return (x, y, z)

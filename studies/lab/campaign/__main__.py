@@ -1,0 +1,103 @@
+"""`python -m studies.lab.campaign --seed N --scenes K --results DIR`: trust, measured on K random scenes of a seed.
+
+What was interrupted continues. Exit code 1: a body is silent and far off.
+"""
+
+import argparse
+import json
+import os
+import subprocess
+import sys
+import time
+from collections import Counter
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from studies import StudyError
+from studies.catalog.accuracy import BUDGETS, FINEST
+from studies.lab.campaign.draw import MOST, member
+from studies.lab.campaign.outcome import Outcome, outcomes
+
+CELLS = [f"{told}, {truth}" for told in ("silent", "doubted") for truth in ("right", "wrong", "far", "undecided")]
+FINE, WORST_FIRST = ("silent, right", "doubted, right", "not ok", "refused"), [*CELLS, "crashed"]
+MOST_DOUBTED = 0.15
+"""Largest share of the right bodies that may be doubted."""
+
+
+def result_of(root: Path, seed: int, number: int, scans: list[Path], most: float) -> dict[str, Any]:
+    """What a member gives, as JSON; most: unknowns of its reference. Raises StudyError for one that has no scene."""
+    scene, started = member(seed, number, scans), time.process_time()
+    assert scene.reference is not None  # a member has a plan
+    scene = replace(scene, reference=replace(scene.reference, most=most))
+    print(f"{number}: {scene.title}", flush=True)
+    nodes = int(np.random.default_rng([seed, number, 1]).choice([*BUDGETS, FINEST]))
+    bodies, fault = outcomes(root, scene, nodes)
+    row = {"member": number, "commit": commit(), "title": scene.title, "fault": fault}
+    return row | {"seconds": time.process_time() - started, "bodies": [asdict(one) for one in bodies]}
+
+
+def commit() -> str:
+    """Of the code, "-dirty" if files differ from it."""
+    words = "git", "describe", "--always", "--dirty", "--exclude=*"
+    return subprocess.run(words, cwd=Path(__file__).parent, capture_output=True, text=True).stdout.strip() or "unknown"
+
+
+def table_of(rows: list[dict[str, Any]], again: str) -> tuple[str, int]:
+    """Counts of all bodies, and those that are not right with the command that repeats them; how many of them are
+    silent and far off."""
+    bodies = [(row, Outcome(**one)) for row in rows for one in row["bodies"]]
+    heads = [*CELLS, "not ok", "refused", "crashed"]
+    lines = ["| body | " + " | ".join(heads) + " |", "|---" * (1 + len(heads)) + "|"]
+    for way in [*dict.fromkeys(one.way for _, one in bodies), "all"]:
+        counts = Counter(one.kind for _, one in bodies if way in (one.way, "all"))
+        lines.append(f"| {way} | " + " | ".join(str(counts[head]) for head in heads) + " |")
+    far, doubted, right = counts["silent, far"], counts["doubted, right"], counts["silent, right"]
+    lines.append(f"\nsilent and more than 3 targets off: {far} (allowed: 0)")
+    lines.append(f"right but doubted: {doubted} of {doubted + right} (allowed: {100 * MOST_DOUBTED:.0f} %)")
+    lines.append(f"commits: {', '.join(sorted({row['commit'] for row in rows}))}")
+    odd = [(row, one) for row, one in bodies if one.kind not in FINE]
+    for row, one in sorted(odd, key=lambda pair: WORST_FIRST.index(pair[1].kind)):
+        errors = ", ".join(f"{name} {value:+.2g} ± {bar:.1g} %" for name, (value, bar, _) in one.errors.items())
+        why = "; ".join(filter(None, [errors, row["fault"], one.message, *one.doubts]))
+        lines.append(f"{one.kind}: {row['title']}; {one.way}: {one.recipe}; {why}\n  {again} {row['member']}")
+    return "\n".join(lines), far
+
+
+def main(words: list[str]) -> int:
+    parser = argparse.ArgumentParser(prog="python -m studies.lab.campaign", description=(__doc__ or "").split("\n")[0])
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--scenes", type=int, default=200, metavar="K")
+    parser.add_argument("--results", type=Path, default=Path("results"), metavar="DIR")
+    parser.add_argument("--scans", type=Path, metavar="FOLDER", help="surfaces, PLY in mm; default: none, skipped")
+    parser.add_argument("--most", type=float, default=MOST, metavar="N", help="unknowns of references")
+    parser.add_argument("--member", type=int, metavar="N", help="this one alone, again")
+    given = parser.parse_args(words)
+    scans = sorted(given.scans.glob("*.ply")) if given.scans else []
+    root = given.results / f"campaign-{given.seed}"
+    root.mkdir(parents=True, exist_ok=True)
+    print(f"seed {given.seed}, commit {commit()}", flush=True)
+    for number in range(given.scenes) if given.member is None else [given.member]:
+        path = root / f"{number:04d}.json"
+        if given.member is None and path.is_file():
+            continue
+        try:
+            text = json.dumps(result_of(root, given.seed, number, scans, given.most), indent=1) + "\n"
+        except StudyError as error:
+            print(f"member {number} is skipped: {error}")
+            continue
+        part = path.with_suffix(".part")
+        part.write_text(text, encoding="utf-8")
+        os.replace(part, path)
+    rows = [json.loads(path.read_text(encoding="utf-8")) for path in sorted(root.glob("*.json"))]
+    options = f"--seed {given.seed} --results {given.results} --most {given.most:g}"
+    options += f" --scans {given.scans}" if given.scans else ""
+    text, far = table_of(rows, f"{parser.prog} {options} --member")
+    print(text)
+    return int(far > 0)
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,136 @@
+"""What a user is told of a body in a scene, and whether it is right."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from studies import (
+    METRICS,
+    BodyRecipe,
+    Case,
+    ImplicitVolume,
+    Record,
+    Run,
+    Scene,
+    Status,
+    StudyError,
+    measure,
+    recommended,
+    solve_reference,
+)
+from studies.catalog.accuracy import LONG, even
+from studies.catalog.of_scene import study_of
+from studies.metrics.judged import DISPLACEMENT, FORCE
+from studies.metrics.metrics import few_facets
+from studies.metrics.trust import verdicts
+from studies.metrics.wish import usual_wish
+from studies.runs.indicators import remarks
+from studies.scene.checks import check_scene
+
+JUDGED, UNIFORM, ADVISED = "run FILE.py", "uniform", "advised"
+"""Ways to a body: the finer of the two meshes of `organbench run FILE.py`, which the coarser one judges; uniform with a
+random size; the one that `advise` recommends."""
+BAR, FAR = 1.0 / 3.0, 3.0
+"""Over the target: largest bar of a reference that judges, and error beyond which a body is far off."""
+ELSEWHERE = "frames take longer", "the motion is"
+"""Parts of sentences on cost and on the way: they do not doubt the end, where a member is judged."""
+
+
+@dataclass
+class Outcome:
+    """Of one body in a scene."""
+
+    way: str
+    recipe: str
+    status: str
+    """A Status, "refused" or "crashed"."""
+    message: str = ""
+    doubts: list[str] = field(default_factory=list)
+    """Warnings, a mark, and why two meshes are not alike."""
+    errors: dict[str, tuple[float, float, float]] = field(default_factory=dict)
+    """Quantity -> (error, bar of the reference, target) [%]."""
+    signs: dict[str, float] = field(default_factory=dict)
+    """Metrics and attributes of the run, to find the kind of a fault."""
+
+    @property
+    def kind(self) -> str:
+        """What the user is told, and of a body that is ok the truth."""
+        if self.status != Status.OK:
+            return self.status if self.status in ("refused", "crashed") else "not ok"
+        return f"{'doubted' if self.doubts else 'silent'}, {self.truth}"
+
+    @property
+    def truth(self) -> str:
+        """ "right", "wrong", "far" wherever in its bar the reference is, or "undecided"."""
+        known = [(abs(value), bar, target) for value, bar, target in self.errors.values() if not math.isnan(value)]
+        if any(value - bar > FAR * target for value, bar, target in known):
+            return "far"
+        if not known or any(not bar <= BAR * target for _, bar, target in known):
+            return "undecided"
+        return "right" if all(value <= target for value, _, target in known) else "wrong"
+
+
+def outcomes(root: Path, scene: Scene, nodes: int) -> tuple[list[Outcome], str]:
+    """Every way through a scene, and what is wrong with its reference, which is solved below `root` if a body is ok.
+
+    nodes: of the uniform body.
+    """
+    alone, ran = replace(scene, reference=None), dict[str, Record]()  # as a user has it
+    ended = [
+        _ended(JUDGED, lambda: study_of(alone).cases[-1], alone, ran),
+        _ended(UNIFORM, lambda: _case(alone, replace(even(alone)[0], nodes=nodes), LONG), alone, ran),
+        _ended(ADVISED, lambda: _case(alone, *recommended(alone)), alone, ran),
+    ]
+    fine = ended[0][1]
+    if fine is not None:
+        other, coarse = _ended(JUDGED, lambda: study_of(alone).cases[-2], alone, ran)
+        if coarse is None:
+            ended[0][0].doubts.append(f"the coarser mesh is {other.status}: {other.message}")
+        else:
+            ended[0][0].doubts += [one.why for one in verdicts([coarse, fine]) if not one.trusted]
+    runs = [(one, run) for one, run in ended if run is not None]
+    try:
+        return [one for one, _ in ended], _judge(root, scene, runs) if runs else ""
+    except StudyError as error:
+        return [one for one, _ in ended], str(error)
+
+
+def _case(scene: Scene, body: BodyRecipe, dt_fraction: float) -> Case:
+    return Case(scene, body, ImplicitVolume(), dt_fraction=dt_fraction)
+
+
+def _ended(way: str, chosen: Callable[[], Case], scene: Scene, ran: dict[str, Record]) -> tuple[Outcome, Run | None]:
+    """What is told of a case, and its run if it is ok; ran: records of the scene by recipe, which do not run again."""
+    try:
+        odd, case = check_scene(scene), chosen()
+        recipe = f"{case.body!r}, dt_fraction={case.dt_fraction:g}"
+        record = ran[recipe] = ran.get(recipe) or measure(case)
+    except StudyError as error:
+        return Outcome(way, "", "refused", str(error)), None
+    except Exception as error:  # a program that breaks is a finding, not the end of the campaign
+        return Outcome(way, "", "crashed", f"{type(error).__name__}: {error}"), None
+    early = record.status in (Status.FAILED, Status.SKIPPED)  # refused before the first step
+    one = Outcome(way, recipe, "refused" if early else str(record.status), record.message)
+    if record.status != Status.OK:
+        return one, None
+    run = Run(case, record)
+    one.signs = {name: value for name, value in record.attributes.items() if isinstance(value, int | float)}
+    warnings = str(record.attributes["warnings"])
+    for sentence in remarks(one.signs):
+        warnings = warnings.replace(sentence, "") if any(part in sentence for part in ELSEWHERE) else warnings
+    one.doubts = [words for words in (*odd, warnings.strip("; "), "few facets" * few_facets(run)) if words]
+    one.signs |= {entry.name: value for entry in METRICS if math.isfinite(value := entry(run))}
+    return one, run
+
+
+def _judge(root: Path, scene: Scene, runs: list[tuple[Outcome, Run]]) -> str:
+    """Compares runs with the reference; returns its warning. Raises StudyError where it cannot be solved."""
+    reference, wish = solve_reference(root, scene), usual_wish(scene)
+    for one, run in runs:
+        judged = replace(run, case=replace(run.case, scene=scene), reference=reference)
+        for entry, target in ((FORCE, wish.force), (DISPLACEMENT, wish.displacement)):
+            assert target is not None  # the usual wish bounds both
+            bar = math.inf if reference.warnings else entry.uncertainty(judged)
+            one.errors[entry.name] = (entry(judged), bar, target)
+    return reference.warnings

@@ -1,0 +1,109 @@
+"""The campaign: a member is the same whatever was drawn before, what a user is told is counted as that, and what was
+interrupted continues."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from studies import StudyError
+from studies.lab.campaign import __main__ as command
+from studies.lab.campaign import outcome
+from studies.lab.campaign.draw import CLEAR, END, LOADS, member
+from studies.lab.campaign.outcome import Outcome
+from studies.runs.indicators import remarks
+from studies.scene.checks import check_scene, surface_of
+from tests.studies.made_up_run import ATTRIBUTES, SCENE, run
+
+pytestmark = pytest.mark.lab
+FORCE, MEAN, NONE = (0.5, 0.1, 3.0), (0.2, 0.05, 1.0), (np.nan, np.nan, 1.0)
+SOUND = dict.fromkeys(("alternation", "sway", "swing", "gained", "volume_off"), 0.0) | {"pace": 1.0, "shortened": 1.0}
+NUMBERS = [2, 3, 62, 17, 18, 19, 67]
+"""Of seed 7: a member for each load, none of a scan; at the first places of 62 and 67 the probe comes near the hold."""
+WORDS = "squeeze", "plane", "sphere", "hanging", "filled", "pulled", "capsule"
+
+
+def test_a_member_does_not_depend_on_those_before_and_its_load_stays_clear_of_what_is_held():
+    scenes = [member(7, number) for number in NUMBERS]
+    assert member(7, NUMBERS[-1]) == scenes[-1] != member(8, NUMBERS[-1])
+    assert len(LOADS) == len(WORDS) and all(map(str.__contains__, [scene.title for scene in scenes], WORDS))
+    for scene in scenes:
+        points, triangles = surface_of(scene.organ, scene.name)
+        middle = points[triangles].mean(axis=1)
+        held = middle[scene.held[0].region.level(middle) <= 0.0]
+        assert len(held) and check_scene(scene) == []
+        for obstacle in scene.obstacles:
+            assert obstacle.gap(middle, 0.0).min() > 0.0 > obstacle.gap(middle, END).min()
+            assert obstacle.gap(held, END).min() >= CLEAR - 1e-5
+        for pulled in scene.held[1:]:
+            assert pulled.region.level(held).min() > 0.0 < np.linalg.norm(pulled.path(END))
+
+
+def test_a_member_of_a_scan_is_skipped_with_a_sentence():
+    with pytest.raises(StudyError, match="--scans FOLDER"):
+        [member(7, number) for number in range(20)]
+
+
+@pytest.mark.parametrize(
+    ("force", "mean", "truth"),
+    [
+        (FORCE, MEAN, "right"),
+        (FORCE, NONE, "right"),
+        ((-3.1, 0.1, 3.0), MEAN, "wrong"),
+        ((-9.2, 0.1, 3.0), MEAN, "far"),
+        ((-9.2, 0.9, 3.0), MEAN, "wrong"),  # the reference may be so far off that it is less than 9 %
+        ((-30.0, 5.0, 3.0), MEAN, "far"),  # and here not
+        (FORCE, (0.2, 0.4, 1.0), "undecided"),
+        (NONE, NONE, "undecided"),
+    ],
+)
+def test_truth(force, mean, truth):
+    assert Outcome("", "", "ok", errors={"force": force, "displacement": mean}).truth == truth
+
+
+@pytest.mark.parametrize(
+    ("told", "signs", "answer"),
+    [
+        ("ok", {}, "silent"),
+        ("ok", {"shortened": 3.0, "pace": 1.3}, "silent"),
+        ("ok", {"pace": 1.3, "sway": 0.02}, "doubted"),
+        ("folded", {}, "not ok"),
+        ("timed-out", {}, "not ok"),
+        ("failed", {}, "refused"),
+        ("skipped", {}, "refused"),
+        (StudyError("no"), {}, "refused"),
+        (ZeroDivisionError("0"), {}, "crashed"),
+    ],
+)
+def test_what_a_user_is_told(told, signs, answer, monkeypatch):
+    def measured(case):
+        if isinstance(told, Exception):
+            raise told
+        attributes = ATTRIBUTES | SOUND | signs
+        warnings = "; ".join(remarks(attributes))
+        return replace(run().record, status=told, attributes=attributes | {"warnings": warnings})
+
+    monkeypatch.setattr(outcome, "measure", measured)
+    monkeypatch.setattr(outcome, "check_scene", lambda scene: [])
+    one = outcome._ended("", lambda: run().case, SCENE, {})[0]
+    assert one.kind.split(",")[0] == answer, one.message
+
+
+def test_what_was_interrupted_continues_and_a_silent_body_that_is_far_off_fails(tmp_path, monkeypatch, capsys):
+    """Members 0, 1, 6 and 8 to 12 of seed 7 are of scans: they are skipped, and drawn again when there are some."""
+    asked, far = [], {"force": (90.0, 0.1, 3.0)}
+
+    def outcomes(root, scene, nodes):
+        asked.append(scene.name)
+        return [Outcome("uniform", "recipe", "ok", errors=far if len(asked) == 2 else {"force": FORCE})], ""
+
+    monkeypatch.setattr(command, "outcomes", outcomes)
+    line = ["--seed", "7", "--results", str(tmp_path), "--scenes"]
+    assert [command.main([*line, count]) for count in ("3", "4", "4")] == [0, 1, 1] and len(asked) == 2
+    text = capsys.readouterr().out
+    assert (
+        "more than 3 targets off: 1 (" in text
+        and f"--results {tmp_path} --most 60000 --member 3\n" in text
+        and text.count("member 1 is skipped: its organ is a scan") == 3
+    )
+    assert command.main([*line, "2", "--member", "3"]) == 0 and len(asked) == 3
