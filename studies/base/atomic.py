@@ -39,7 +39,7 @@ def part_beside(path: Path, size: int | None = None) -> Iterator[Path]:
         if os.name == "posix":  # elsewhere a folder cannot be opened
             _flush(path.parent)
     except OSError as problem:
-        raise StudyError(_sentence(path, size, problem)) from problem
+        raise StudyError(unwritten(path, problem, size)) from problem
     finally:
         _remove(part)
 
@@ -100,7 +100,8 @@ def _flush(path: Path) -> None:
         os.close(descriptor)
 
 
-def _sentence(path: Path, size: int | None, problem: OSError) -> str:
+def unwritten(path: Path, problem: OSError, size: int | None = None) -> str:
+    """Why a file was not written, and the way out."""
     if problem.errno in (errno.ENOSPC, errno.EDQUOT):
         megabytes = "" if size is None else f" ({size / 1e6:.1f} MB)"
         return (

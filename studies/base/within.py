@@ -1,8 +1,19 @@
-"""Files that other files name: a stranger's file names its neighbours, and nothing else."""
+"""What a stranger's file may name and promise: its neighbours, and no more bytes than a machine can hold."""
 
 from pathlib import Path
 
 from studies.base.errors import StudyError
+
+MOST_BYTES = 2e9
+"""That a packed file may unpack to: a mask of 512 × 512 × 1,900 voxels of four bytes each."""
+
+
+def check_unpacked(size: float, by: str, way_out: str) -> None:
+    """Raises StudyError for a packed file `by` whose head says that it unpacks to more than MOST_BYTES."""
+    if size > MOST_BYTES:
+        raise StudyError(
+            f"{by} holds {1e-9 * size:.3g} GB unpacked; at most {1e-9 * MOST_BYTES:g} GB are read: {way_out}"
+        )
 
 
 def file_within(folder: Path, name: str, by: str) -> Path:

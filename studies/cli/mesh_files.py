@@ -1,16 +1,14 @@
 """Mesh files on the command line: their unit and scale, and questions before they are read."""
 
 import sys
-from contextlib import AbstractContextManager
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
-from rich.markup import escape
 
 from studies.base.errors import StudyError
-from studies.cli.terminal import busy, visible, warn
+from studies.cli.terminal import visible, warn
 from studies.geometry.files.faults import check_promises, size_warning
 from studies.geometry.files.opening import opened
 from studies.geometry.files.units import UNITS, Source, check_unit, length_of, likely_units, unit_question
@@ -61,8 +59,3 @@ def settled(source: Source, yes: bool) -> Source:
     answer = str(typer.prompt(visible(question), default=likely))
     check_unit(answer)
     return replace(source, unit=answer)
-
-
-def working(what: str) -> AbstractContextManager[Any]:
-    """A line that moves during a long task with a name of the user."""
-    return busy(escape(what))

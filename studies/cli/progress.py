@@ -7,9 +7,11 @@ from contextlib import ExitStack, contextmanager
 from types import TracebackType
 
 from rich.console import Console
+from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
 
 from studies.base.counting import amounts
+from studies.base.doing import Doing, hearing
 from studies.base.interrupts import stop_if_pressed
 from studies.cli.terminal import QUIET_SECONDS, beating, busy
 from studies.store.entry import MISSING
@@ -44,8 +46,10 @@ class TerminalProgress:
         self.begun = self.last_report = time.monotonic()
         self.last_compile_report = 0.0
         self.beats = ExitStack()
+        self.doing = ""
 
     def __enter__(self) -> "TerminalProgress":
+        self.beats.enter_context(hearing(self.hear))
         if self.console.is_terminal:
             self.bars.start()
         else:
@@ -64,7 +68,8 @@ class TerminalProgress:
             self.last_report = now
             what, (done, total) = list(self.totals.items())[-1]
             left = self.left()
-            self._line(f"{what} {done}/{total} done, {words(now - self.begun)}" + (f", {left}" if left else ""))
+            left, at = f", {left}" if left else "", f": {self.doing}" if self.doing else ""
+            self._line(f"{what} {done}/{total} done, {words(now - self.begun)}{left}{at}")
 
     def begin(self, what: str, total: int) -> None:
         self.totals[what] = [0, total]
@@ -77,6 +82,7 @@ class TerminalProgress:
         """One piece is done; a Ctrl-C that was lost on the way counts here."""
         stop_if_pressed()
         self.pending.pop((what, note), None)
+        self.doing = ""  # of several processes the next that begins something says so
         self.done[kind_of(what, note)] += 1
         left = self.left()
         self.bars.update(self.tasks[what], advance=1, note=left or note)
@@ -92,9 +98,13 @@ class TerminalProgress:
         seconds = expected(list(self.pending.values()), self.jobs)
         return f"about {words(seconds)} left" if seconds else ""
 
-    def compiling(self, name: str) -> None:
-        """A function is being compiled, here or in another process; from any thread."""
-        if name in self.compiled:
+    def hear(self, name: str) -> None:
+        """A function is being compiled, or a process says what it does, this one or another; from any thread."""
+        if isinstance(name, Doing):
+            self.doing = str(name)
+            for task in self.tasks.values():
+                self.bars.update(task, note=self.doing)
+        if isinstance(name, Doing) or name in self.compiled:
             return
         self.compiled.add(name)
         if self.console.is_terminal:
@@ -113,7 +123,7 @@ def compiling(doing: str) -> Iterator[Callable[[str], None]]:
     """Inside, what is given names is shown as being compiled, next to what is being done; in a log a line every
     QUIET_SECONDS."""
     with busy(doing) as status:
-        yield lambda name: status and status.update(f"{doing}: compiling {name} (kept for the next time) …")
+        yield lambda name: status and status.update(f"{escape(doing)}: compiling {name} (kept for the next time) …")
 
 
 def dry_run(console: Console, study: str, planned: list[Planned], jobs: int) -> None:

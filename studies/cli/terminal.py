@@ -10,8 +10,10 @@ from typing import Annotated, Any
 
 import typer
 from rich.console import Console, ConsoleOptions, RenderableType
+from rich.markup import escape
 from rich.segment import Segment
 
+from studies.base.doing import hearing
 from studies.base.errors import StudyError
 from studies.catalog import STUDIES
 from studies.scene.library import CUT, SCENES
@@ -100,12 +102,22 @@ def warn(sentences: list[str]) -> None:
         errors.print(f"warning: {sentence}", markup=False, highlight=False)
 
 
-def busy(what: str) -> Any:
-    """A line that moves while something takes long; where there is no terminal, a line every QUIET_SECONDS."""
-    if errors.is_terminal:
-        return errors.status(f"{what} …")
-    begun = time.monotonic()
-    return beating(lambda: errors.print(f"{what}, {time.monotonic() - begun:.0f} s", markup=False, highlight=False))
+@contextmanager
+def busy(what: str) -> Iterator[Any]:
+    """A line that moves while something takes long; where there is no terminal, a line every QUIET_SECONDS. It says
+    what is being done."""
+    begun, now = time.monotonic(), what
+    beat = beating(lambda: errors.print(f"{now}, {time.monotonic() - begun:.0f} s", markup=False, highlight=False))
+    with errors.status(f"{escape(what)} …") if errors.is_terminal else beat as status:
+
+        def hear(more: str) -> None:
+            nonlocal now
+            now = f"{what}: {more}"
+            if status is not None:
+                status.update(f"{escape(now)} …")
+
+        with hearing(hear):
+            yield status
 
 
 @contextmanager

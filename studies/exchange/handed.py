@@ -6,14 +6,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
-from zipfile import is_zipfile
+from zipfile import ZipFile, is_zipfile
 
 import numpy as np
 import pandas as pd
 
 from studies.base.errors import StudyError
 from studies.base.hdf5 import reading
-from studies.base.within import file_within
+from studies.base.within import check_unpacked, file_within
 from studies.geometry.files.writing import SUFFIX, read_points
 
 DISPLACEMENT = "displacement"
@@ -94,6 +94,8 @@ def _check_separators(path: Path) -> None:
 def _read_npz(path: Path) -> Handed:
     if not is_zipfile(path):
         raise StudyError(f"{path.name} is not an npz file; numpy.savez writes one")
+    with ZipFile(path) as packed:
+        check_unpacked(sum(one.file_size for one in packed.infolist()), path.name, "hand in the checkpoints alone")
     with np.load(path, allow_pickle=False) as file:
         missing = [name for name in ("t", "positions") if name not in file]
         if missing:

@@ -61,3 +61,9 @@ class Metric:
         if self.quantity is None or self.quantity in ALWAYS:
             return True
         return run.reference is not None and allowed(run.case.scene, self.quantity)
+
+
+def compared(unit: str, better: str, quantity: str) -> Callable[[Callable[[Run], float]], Metric]:
+    """Makes a function the metric of its name, wherever it is called: what needs a reference has no value without one,
+    nor in a scene that does not allow the comparison."""
+    return lambda of: Metric(of.__name__, unit, better, of, quantity)

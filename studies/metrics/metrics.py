@@ -13,7 +13,7 @@ from studies.geometry.surface.sides import along_facets
 from studies.meshing.bounds import FEW
 from studies.meshing.rest_surface import OUTER
 from studies.metrics import cutting
-from studies.metrics.metric import PERCENT, Metric
+from studies.metrics.metric import PERCENT, Metric, compared
 from studies.metrics.run import Run
 from studies.reference.ringing import ringing_frequency
 
@@ -31,6 +31,7 @@ def volume_end(run: Run) -> float:
     return PERCENT * float(run.volume_ratio[-1] - 1)
 
 
+@compared("%", "lower", "force")
 def force_error(run: Run) -> float:
     """100 ‖F − F_ref‖/‖F_ref‖ over the checkpoints [%]."""
     assert run.reference is not None
@@ -38,6 +39,7 @@ def force_error(run: Run) -> float:
     return PERCENT * float(np.linalg.norm(run.force[run.checkpoint_frames] - truth) / np.linalg.norm(truth))
 
 
+@compared("%", "-", "force_end")
 def force_end(run: Run) -> float:
     """100 (F/F_ref − 1) at the last checkpoint [%]."""
     assert run.reference is not None
@@ -49,6 +51,7 @@ def _relative(run: Run, weights: np.ndarray) -> float:
     return PERCENT * float(np.sqrt((weights @ (error**2).sum(axis=1)) / (weights @ (truth**2).sum(axis=1))))
 
 
+@compared("%", "lower", "surface")
 def surface_error(run: Run) -> float:
     """Area-weighted relative L2 error of the displacement of the surface at the last checkpoint [%].
 
@@ -57,6 +60,7 @@ def surface_error(run: Run) -> float:
     return _relative(run, run.surface_weights)
 
 
+@compared("%", "lower", "interior")
 def interior_error(run: Run) -> float:
     """Volume-weighted relative L2 error of the displacement at the last checkpoint [%]; NaN without an interior.
 
@@ -67,6 +71,7 @@ def interior_error(run: Run) -> float:
     return _relative(run, run.fields.mass)
 
 
+@compared("%", "lower", "surface_mean")
 def mean_error(run: Run) -> float:
     """Area-weighted mean error over the true surface, with what the body lacks, over the largest displacement [%].
 
@@ -92,6 +97,7 @@ def shape_volume(run: Run) -> float:
     return PERCENT * run.shape.volume
 
 
+@compared("%", "lower", "silhouette")
 def silhouette_error(run: Run) -> float:
     """Hausdorff distance of the deformed surface to its deformation by the reference, over the body's size [%]."""
     triangles = run.fields.triangles
@@ -147,6 +153,7 @@ def penetration(run: Run) -> float:
     )
 
 
+@compared("%", "-", "pressure")
 def pressure_error(run: Run) -> float:
     """100 (lam/p_ref − 1) at the last checkpoint [%]; NaN for a method without a pressure."""
     assert run.reference is not None
@@ -154,6 +161,7 @@ def pressure_error(run: Run) -> float:
     return PERCENT * (lam / float(run.reference.field("pressure")[-1]) - 1) if lam else float("nan")
 
 
+@compared("%", "lower", "opening")
 def opening_error(run: Run) -> float:
     """Area-weighted relative L2 error of the displacement across the cut at the last checkpoint [%], of several cuts
     the largest."""
@@ -170,6 +178,7 @@ def overlap(run: Run) -> float:
     return PERCENT * max(0.0, -float(run.gap(run.opening).min())) / run.size
 
 
+@compared("%", "-", "frequency")
 def frequency_error(run: Run) -> float:
     """100 (f/f_ref − 1) of the ringing, both read off the displacement of the same points [%]."""
     assert run.reference is not None
@@ -181,6 +190,7 @@ def frequency_error(run: Run) -> float:
     return PERCENT * (measured / right - 1)
 
 
+@compared("%", "-", "lumen")
 def lumen_pressure_error(run: Run) -> float:
     """100 (lam/p_ref − 1) of the lumen at the last checkpoint [%]; NaN where the lumen is no volume of its own."""
     assert run.reference is not None
@@ -296,15 +306,15 @@ def _time_spread(metric: Callable[[Run], float]) -> Callable[[Run], float]:
 METRICS: tuple[Metric, ...] = (
     Metric("volume_worst", "%", "lower", volume_worst, "volume"),
     Metric("volume_end", "%", "-", volume_end, "volume"),
-    Metric("force_error", "%", "lower", force_error, "force"),
-    Metric("force_end", "%", "-", force_end, "force_end"),
-    Metric("surface_error", "%", "lower", surface_error, "surface"),
-    Metric("interior_error", "%", "lower", interior_error, "interior"),
-    Metric("mean_error", "%", "lower", mean_error, "surface_mean"),
-    Metric("silhouette_error", "%", "lower", silhouette_error, "silhouette"),
+    force_error,
+    force_end,
+    surface_error,
+    interior_error,
+    mean_error,
+    silhouette_error,
     Metric("shape_error", "%", "lower", shape_error),
     Metric("shape_volume", "%", "-", shape_volume),
-    Metric("opening_error", "%", "lower", opening_error, "opening"),
+    opening_error,
     Metric("overlap", "%", "lower", overlap),
     Metric("piece_worst", "%", "lower", cutting.piece_worst),
     Metric("piece_sum_worst", "%", "lower", cutting.piece_sum_worst),
@@ -312,9 +322,9 @@ METRICS: tuple[Metric, ...] = (
     Metric("cut_momentum", "%", "lower", cutting.cut_momentum),
     Metric("cut_limit", "1", "higher", cutting.cut_limit),
     Metric("cut_ms", "ms", "lower", cutting.cut_ms),
-    Metric("pressure_error", "%", "-", pressure_error, "pressure"),
-    Metric("frequency_error", "%", "-", frequency_error, "frequency"),
-    Metric("lumen_pressure_error", "%", "-", lumen_pressure_error, "lumen"),
+    pressure_error,
+    frequency_error,
+    lumen_pressure_error,
     Metric("min_j", "1", "higher", min_j),
     Metric("j_spread", "%", "lower", j_spread),
     Metric("inverted_share", "%", "lower", inverted_share),

@@ -116,9 +116,8 @@ def _motion(scene: Scene) -> Trajectory:
 def _error(run: Run) -> str:
     if run.record.status not in COMPARABLE:
         return str(run.record.status)
-    if run.reference is None:
-        return f"{run.force[run.checkpoint_frames[-1]]:.2g} N"
-    return signed_percent(force_end(run))
+    error = force_end(run)  # unknown without a reference, and where the scene compares no force
+    return f"{run.force[run.checkpoint_frames[-1]]:.2g} N" if error != error else signed_percent(error)
 
 
 def _label(axes: Axes, ends: Sequence[tuple[float, str, str]], low: float, top: float) -> None:

@@ -19,6 +19,7 @@ from reference_fem.statics.newton import StepFailed
 from reference_fem.system.saddle_point import System
 from reference_fem.system.state import State
 from reference_fem.uncertainty import MeshError
+from studies.base.doing import doing
 from studies.meshing.nested_mesh import CHILD, NestedMesh, at_nodes, base_mesh
 from studies.reference.problem import problem_on
 from studies.reference.reference_solves import settings_varied
@@ -100,25 +101,28 @@ def solve_nested(scene: Scene, variants: Mapping[str, Varied]) -> FamilySolution
 
     Raises StudyError for a mesh that cannot be made.
     """
-    plan, times = scene.reference, scene.checkpoints
+    plan, times, mesh = scene.reference, scene.checkpoints, f"reference of {scene.name}: mesh"
     assert plan is not None  # the scene has a reference
+    doing(f"{mesh} 1 of its family")
     base = base_mesh(scene, plan.base, plan.at_contact)
     work, ends = problems_of(base), list[Checkpoint]()
     problem = work[-1][0]
     at = SamplePoints(nodes(base.mesh)[: base.mesh.nvertices], base.mesh.t[:4].T.astype(np.int64))
     try:
-        equilibria = path_of(base, work, ends.append)
-        varied = [
-            sample_of(scene, problem, path_of(base, work, better=variants[name]), at, math.nan, name)
-            for name in settings_varied(scene)
-        ]
+        equilibria, varied = path_of(base, work, ends.append), list[Sample]()
+        for name in settings_varied(scene):
+            doing(f"{mesh} 1 of its family with other {name}")
+            path = path_of(base, work, better=variants[name])
+            varied.append(sample_of(scene, problem, path, at, math.nan, name))
     except SolveError as error:
         reached = [e for e in error.converged if e.t in times]
         return FamilySolution(problem, reached, at, [], base.off, failure=str(error))
     states = iter([end.state for end in ends])
     latest = MeshSolution(base, [Part(System(one, LOOSE), list(islice(states, len(some)))) for one, some, _ in work])
     samples, stopped = [sample_of(scene, problem, equilibria, at, math.nan)], ""
-    for target in targets(latest.system.total, plan.most):
+    sizes = targets(latest.system.total, plan.most)
+    for number, target in enumerate(sizes, 2):
+        doing(f"{mesh} {number} of {1 + len(sizes)}, {target:,.0f} unknowns")
         try:
             latest, before = refined(latest, target), latest
         except SolveError as failure:

@@ -18,6 +18,7 @@ from reference_fem import (
     motion_path,
     nodes,
 )
+from studies.base.doing import doing
 from studies.base.errors import StudyError
 from studies.geometry.mesh.organ_mesh import mean_edge, tetrahedron_facets
 from studies.reference.nested import FamilySolution, solve_nested
@@ -143,7 +144,9 @@ def solve_levels(scene: Scene) -> FamilySolution:
     assert plan is not None  # the scene has a reference
     runs = [(level, "") for level in plan.levels] + [(plan.levels[0], name) for name in settings_varied(scene)]
     at, samples, finest = None, list[Sample](), None
-    for level, variant in runs:
+    for number, (level, variant) in enumerate(runs, 1):
+        other = f" with other {variant}" if variant else ""
+        doing(f"reference of {scene.name}: mesh {1 if variant else number} of {len(plan.levels)}{other}")
         work: Set = (reference_problem(scene, level), times, NewtonSettings())
         problem = work[0]
         if at is None:
@@ -154,9 +157,8 @@ def solve_levels(scene: Scene) -> FamilySolution:
         try:
             path = motion(scene, variant, *work) if plan.dt is not None else equilibrium_path(*work)
         except SolveError as error:
-            what = f"mesh {level:g}" + (f" with other {variant}" if variant else "")
             reached = [e for e in error.converged if e.t in times]
-            return FamilySolution(problem, reached, at, samples, failure=f"on {what}: {error}")
+            return FamilySolution(problem, reached, at, samples, failure=f"on mesh {level:g}{other}: {error}")
         path = [e for e in path if e.t in times]
         samples.append(sample_of(scene, work[0], path, at, element_size(scene, level), variant))
         if (level, variant) == (plan.levels[-1], ""):

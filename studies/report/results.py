@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from studies.base.atomic import write_whole
+from studies.base.doing import doing
 from studies.base.errors import StudyError
 from studies.catalog import STUDIES
 from studies.catalog.study import Study
@@ -190,6 +191,7 @@ class StudyDrawing:
         from studies.plots.style.style import svg_copies  # with matplotlib, which takes half a second to load
 
         root, study = self.ledger.root, self.study
+        doing(study.name)
         own, remarks = load_runs(root, study, self.references)
         submissions, unreadable = entries_beside(root, study.scenes, self.references.of)
         runs, remarks = [*own, *submissions], [*remarks, *unreadable]

@@ -4,7 +4,7 @@ only a failure to store raises."""
 import json
 import time
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -23,6 +23,8 @@ from studies.runs.prepare import Prepared, prepare
 from studies.runs.status import status_of
 from studies.runs.surface_frames import moments, surface_fields
 from studies.runs.user_code import fault_of, files_of
+from studies.scene.checks import check_scene
+from studies.scene.scene import Scene
 from studies.store.record import Field, Record, Status, json_in, new_fields, new_record, read_record, write_record
 from studies.store.schema import RUN_FIELDS
 
@@ -37,17 +39,28 @@ def run_case(root: Path, study: str, case: Case, on_frame: Callable[[int], objec
     path = case_path(root, study, case)
     started = time.perf_counter()
     with watching() as watch:
-        record = measure(case, on_frame)
+        record = record_of(case, on_frame)  # the command has checked its scenes
     seconds = time.perf_counter() - started - watch.seconds
     write_record(path, replace(record, attributes={**record.attributes, "seconds": seconds}))
     return path
 
 
 def measure(case: Case, on_frame: Callable[[int], object] | None = None) -> Record:
-    """The record of a case; its attribute `warnings` holds the warnings of its preparation."""
+    """The record of a case, also of one whose scene cannot start; its attribute `warnings` holds what is unusual about
+    the scene, and the warnings of its preparation."""
+    return record_of(case, on_frame, check_scene)
+
+
+def record_of(
+    case: Case,
+    on_frame: Callable[[int], object] | None = None,
+    check: Callable[[Scene], Sequence[str]] = lambda scene: (),
+) -> Record:
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", UserWarning)
         try:
+            for sentence in check(case.scene):
+                warnings.warn(sentence, stacklevel=2)
             prepared = prepare(case)
             # Attachments that overlap, or hold no node, are detected only when the run starts.
             history = simulate(prepared.setup, snapshot_frames(case, prepared), on_frame, TIME_LIMIT)
@@ -196,7 +209,7 @@ def replay(path: Path) -> tuple[Record, Record, str | None]:
     stored = read_record(path)
     if stored.kind != "run":
         raise StudyError(f"{path} holds a {stored.kind}, only a run can be replayed")
-    new = measure(case_from_json(stored.key))
+    new = record_of(case_from_json(stored.key))
     return stored, new, difference(stored, new)
 
 

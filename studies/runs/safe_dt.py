@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from massspring import StepLimit
 from studies.runs.case import Case
 from studies.runs.prepare import prepare
-from studies.runs.run import measure
+from studies.runs.run import record_of
 from studies.store.record import Status
 
 BELOW, ABOVE = 0.95, 1.10
@@ -90,5 +90,5 @@ def safe_step(case: Case) -> SafeStep:
 
 def _trial(case: Case, dt: float) -> tuple[float, Status]:
     frames = max(1, int(case.scene.duration / (STEPS_PER_FRAME * dt)))
-    record = measure(case.replaced(dt=dt, frames=frames, beyond_limit=True))
+    record = record_of(case.replaced(dt=dt, frames=frames, beyond_limit=True))
     return float(record.attributes.get("dt", dt)), record.status

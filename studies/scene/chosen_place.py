@@ -1,12 +1,14 @@
 """User-chosen places on a body for hold and probe: sides, or points of its surface."""
 
 import re
+from pathlib import Path
 
 import numpy as np
 
 from studies.base.errors import StudyError
 from studies.base.lookup import lookup
-from studies.geometry import BallRegion, HalfSpace
+from studies.geometry import BallRegion, HalfSpace, OrganMesh
+from studies.geometry.files.masks import is_mask
 from studies.geometry.scanned.fidelity import samples
 from studies.geometry.surface.distance import distance_to_surface
 from studies.scene.placing import Vector, along
@@ -18,16 +20,23 @@ NEAR = 0.1
 RADIUS, DEPTH, GAP = 0.10, 0.05, 0.0005
 """Radius of the probe and depth of its press, over the longest side of the body; its distance at the start [m]."""
 SIDES: dict[str, Vector] = {
-    "left": (-1.0, 0.0, 0.0),
-    "right": (1.0, 0.0, 0.0),
+    "left": (1.0, 0.0, 0.0),
+    "right": (-1.0, 0.0, 0.0),
     "front": (0.0, -1.0, 0.0),
     "back": (0.0, 1.0, 0.0),
     "bottom": (0.0, 0.0, -1.0),
     "top": (0.0, 0.0, 1.0),
 }
-"""Directions in the coordinates of the file."""
+"""Of a patient, in the axes of DICOM and of our organs: x to the patient's left, y to the back, z to the head."""
 Place = str | Vector
 """One of SIDES, or a point [m]."""
+
+
+def outwards(side: str, mesh: OrganMesh) -> np.ndarray:
+    """The direction (3,) of one of SIDES in the coordinates of a mesh: that of a label mask has x to the right and y to
+    the front (studies.geometry.files.masks)."""
+    turned = (-1.0, -1.0, 1.0) if is_mask(Path(str(mesh.recipe.get("file", "")))) else (1.0, 1.0, 1.0)
+    return np.multiply(SIDES[side], turned)
 
 
 def place_of(text: str) -> Place:

@@ -9,7 +9,7 @@ from studies.base.errors import StudyError
 from studies.geometry import BallRegion, HalfSpace, OrganMesh
 from studies.geometry.mesh.organ_mesh import triangle_areas, vertex_normals
 from studies.geometry.shape.levelset import PalpationPoint
-from studies.scene.chosen_place import PATCH, SIDES, Place, palpated_at, snapped, vector
+from studies.scene.chosen_place import PATCH, Place, outwards, palpated_at, snapped, vector
 from studies.scene.placing import Vector
 
 HELD = 0.10
@@ -61,13 +61,14 @@ def proposal(mesh: OrganMesh, hold: Place | None = None, probe: Place | None = N
     axes, sides = axes[np.argsort(-sides)], sides[np.argsort(-sides)]
     surface, length = (points, triangles), float(sides[0])
     if hold is None or isinstance(hold, str):
-        outward = blunter_end(centres, areas, axes[0]) if hold is None else np.asarray(SIDES[hold])
+        outward = blunter_end(centres, areas, axes[0]) if hold is None else outwards(hold, mesh)
         region, share = held_end(centres, areas, outward)
     else:
         region, share = held_around(snapped(surface, hold, length, f"{mesh.name}: --hold"), centres, areas)
     normals = vertex_normals(points, triangles)
     if probe is None or isinstance(probe, str):
-        point, normal, flatness = palpated(points, normals, region, length, mesh.name, probe)
+        way = None if probe is None else outwards(probe, mesh)
+        point, normal, flatness = palpated(points, normals, region, length, mesh.name, probe, way)
     else:
         point, normal, flatness = palpated_at(surface, normals, region, length, f"{mesh.name}: --probe", probe)
     rows = tuple(vector(axis) for axis in axes)
@@ -120,9 +121,11 @@ def palpated(
     length: float,
     name: str,
     side: str | None = None,
+    way: np.ndarray | None = None,
 ) -> tuple[Vector, Vector, float]:
     """The node in the middle of the flattest patch far from the hold and freely reachable, the patch's normal, and its
-    flatness; of the patches that look to a side, where one is given. Raises StudyError where there is none."""
+    flatness; where a side is given, of the patches that look along `way` (3,), its direction. Raises StudyError where
+    there is none."""
     around = KDTree(points).query_ball_point(points, PATCH * length)
     mean = np.stack([normals[near].mean(axis=0) for near in around])
     flat = np.linalg.norm(mean, axis=1)
@@ -131,9 +134,9 @@ def palpated(
     level = hold.level(points)
     able = (level > min(FAR * length, HALF * float(level.max()))) & (beyond < FREE * length)
     score = flat
-    if side is not None:
-        able &= outward @ np.asarray(SIDES[side]) > FACING
-        score = mean @ np.asarray(SIDES[side])
+    if way is not None:
+        able &= outward @ way > FACING
+        score = mean @ way
     if not able.any():
         which = "lies far from its clamped end" if side is None else f"far from its clamped end faces {side}"
         raise StudyError(f"{name}: no freely reachable patch {which}; choose a point: organbench place --probe x,y,z")

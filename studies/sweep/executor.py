@@ -9,7 +9,8 @@ from studies.store.ledger import Ledger
 from studies.sweep.job import Job
 
 CompileListener = Callable[[str], object]
-"""Called with the name of a function that is being compiled, from any thread."""
+"""Called with the name of a function that is being compiled, or with what a process does (a Doing), from any
+thread."""
 
 
 class Progress(Protocol):

@@ -11,6 +11,7 @@ from typing import Any, ClassVar
 from numpy.linalg import LinAlgError
 
 from studies.base.atomic import is_there
+from studies.base.doing import doing
 from studies.base.errors import StudyError
 from studies.catalog.study import Study
 from studies.reference.published import Entry, fingerprint_of, published, record_of
@@ -184,6 +185,7 @@ class ReferenceJob(Job):
 
 def do(job: Job) -> Path:
     """Does a job, unless another command has meanwhile; where its record lies."""
+    doing(job.label)
     return job.path if job.done_meanwhile() else job.run()
 
 

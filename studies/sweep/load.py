@@ -4,6 +4,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from studies.base.doing import doing
 from studies.base.errors import OtherVersion, StudyError
 from studies.catalog.study import Study
 from studies.metrics.metric import Metric
@@ -87,6 +88,7 @@ def table_rows(references: References, study: Study, metrics: Sequence[Metric]) 
 def load_run(references: References, job: CaseJob) -> tuple[Run | None, list[StudyError]]:
     """The run of a case with its reference and frame times, None where it cannot be read; and what is wrong."""
     ledger = references.ledger
+    doing(job.label)
     try:
         entry = ledger.entry(job)
         if entry is None:

@@ -9,6 +9,7 @@ from pathlib import Path
 from numba.core import event
 
 from studies.base.compile_watch import EVENT, CompileWatch
+from studies.base.doing import HEARING
 from studies.base.processes import Tell, run_each
 from studies.catalog.study import Study
 from studies.geometry.mesher.jobs import cache_folder
@@ -25,8 +26,9 @@ ONE_THREAD = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUM
 
 
 def begin(files: tuple[Given, ...], tell: Tell) -> None:
-    """What every process does first: it loads the user's `files`, and reports what it compiles."""
+    """What every process does first: it loads the user's `files`, and reports what it does and compiles."""
     load_given(files)
+    HEARING.append(tell)
     event.register(EVENT, CompileWatch(tell))
 
 

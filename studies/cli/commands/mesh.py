@@ -24,9 +24,8 @@ from studies.cli.mesh_files import (
     in_metres,
     settled,
     source_of,
-    working,
 )
-from studies.cli.terminal import say
+from studies.cli.terminal import busy, say
 from studies.geometry import CurvedMesh, OrganMesh, organ, scan, true_shape_of, vary
 from studies.geometry.api.advice import with_command
 from studies.geometry.doctor.examine import TISSUE, examine
@@ -105,9 +104,9 @@ def mesh(
             shape = true_shape_of(file, **how) if count is not None and order == 2 else None
             return Made(mesh, curved_mesh(mesh, shape) if order == 2 else None)
 
-    with working(f"meshing {name or (source and source.name)}"):
+    with busy(f"meshing {name or (source and source.name)}"):
         made = make(nodes)
-    with working("writing"):
+    with busy("writing"):
         write_mesh(made.mesh, output, write_unit, made.curved)
     for line in nearness(made):
         say(line)
@@ -121,7 +120,7 @@ def mesh(
 
 def examined(source: Source, tissue: tuple[float, float], as_json: bool) -> None:
     """Prints the faults of a file; ends with exit code 1 where it has some."""
-    with working(f"examining {source.path.name}"):
+    with busy(f"examining {source.path.name}"):
         report = examine(source, tissue=tissue)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # the file is read again
@@ -198,7 +197,7 @@ def closeness(made: Made, truth: Organ, make: Callable[[int | None], Made]) -> s
     sentence, bounds = f"shape: {errors}", f"within {SHAPE:g} % and {SHAPE_VOLUME:g} %"
     if not errors.worst > 1.0:
         return sentence
-    with working("looking for the number of nodes that keeps the shape"), warnings.catch_warnings():
+    with busy("looking for the number of nodes that keeps the shape"), warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)  # of meshes that are not the output
         for _ in range(TRIES):
             count = 10 * int(np.ceil(0.1 * count * min(max(LEAST, SAFETY * errors.worst), MOST)))

@@ -11,8 +11,8 @@ from studies.base.atomic import write_whole
 from studies.base.errors import StudyError
 from studies.base.lookup import lookup
 from studies.catalog.folder import placed_scene
-from studies.cli.mesh_files import MM, LongestSide, Part, Scale, Unit, Yes, in_metres, settled, source_of, working
-from studies.cli.terminal import say, warn
+from studies.cli.mesh_files import MM, LongestSide, Part, Scale, Unit, Yes, in_metres, settled, source_of
+from studies.cli.terminal import busy, say, warn
 from studies.geometry import BallRegion, scan
 from studies.geometry.files.units import stem_of
 from studies.meshing.bounds import SHAPE, SHAPE_VOLUME, enough
@@ -43,7 +43,7 @@ GROWTH = 1.6
 """Computing time of an adaptive body over a power of its nodes: 2.6, 1.86, 1.22 s/s with 994, 1,194, 1,594."""
 MESHING = 60.0
 """Seconds for the meshes of the same spleen and liver: 26 and 51, and those of the bodies."""
-SIDES_HELP = f"{', '.join(SIDES)} (left is -x, front -y, bottom -z)"
+SIDES_HELP = f"{', '.join(SIDES)} of the patient (+x is left, +y back, +z top; of a mask as its header says)"
 
 
 def place(
@@ -76,7 +76,7 @@ def place(
     source = settled(source_of(path, unit, scale, longest_side, part), yes)
     how: dict[str, Any] = {"smooth": smooth * MM, "holes": close_holes}
     how |= {"solid": in_metres(solid), "wall": in_metres(wall)}
-    with working(f"meshing {path.name}"):
+    with busy(f"meshing {path.name}"):
         mesh = scan(source, nodes, fill=False, **how)
     if source.longest_side is None:
         source = replace(source, unit=mesh.recipe["unit"])  # a scene says it, also where the file does
@@ -112,7 +112,7 @@ def recommended(scene: Scene, case: Case, sample: Unseen) -> tuple[Recommended, 
     tried, refusals, nodes = list[tuple[ShapeErrors, int]](), list[StudyError](), case.body.nodes
     for _ in range(TRIES):
         try:
-            with working(f"the shape of a body of {nodes:,} nodes"), warnings.catch_warnings():
+            with busy(f"the shape of a body of {nodes:,} nodes"), warnings.catch_warnings():
                 warnings.simplefilter("ignore", UserWarning)  # `run` repeats those of the body
                 mesh = mesh_of(scene, replace(case.body, nodes=nodes))
                 facets = mesh.facets if isinstance(mesh, QuadraticMesh) else mesh.triangles

@@ -164,7 +164,7 @@ class Work:
         """Runs what must run, prints how it ended, and returns whether as the study expects."""
         ledger, study, root = self.ledger, self.study, self.ledger.root
         with TerminalProgress(console, self.planned, executor.processes if self.planned else 1) as progress:
-            count = run_studies(root, [study], executor, progress, self.selection, progress.compiling, failures, ledger)
+            count = run_studies(root, [study], executor, progress, self.selection, progress.hear, failures, ledger)
         for folder in (study_folder(root, REFERENCES), root / "cache", cache_folder()):
             sweep_parts(folder)
         warn(link_study(ledger, study.name))
@@ -194,7 +194,7 @@ class Work:
             dry_run(console, name, planned, 1)
             return
         with TerminalProgress(console, planned) as progress:
-            count = measure_again(self.ledger, self.study, progress, progress.compiling)
+            count = measure_again(self.ledger, self.study, progress, progress.hear)
         if self.drawn:
             warn(refresh(self.ledger, self.study)[1])
         say(f"{name}: {count} stored cases were timed again, {'charts' if self.drawn else 'times'} in {self.folder}")

@@ -1,5 +1,6 @@
 """Label masks (segmentations): the surface of one label of a NIfTI or NRRD image."""
 
+import math
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -11,7 +12,7 @@ from scipy.ndimage import find_objects, gaussian_filter
 
 from studies.base.errors import StudyError
 from studies.base.install import pip_install
-from studies.base.within import file_within
+from studies.base.within import check_unpacked, file_within
 from studies.geometry.files.content import Content
 from studies.geometry.mesh.organ_mesh import signed_volume
 
@@ -45,6 +46,8 @@ LONG_NAMES = {
 }
 NIFTI_UNITS = {0: None, 1: "m", 2: "mm", 3: "um"}
 """Lengths by their code in the header (NIfTI-1.1 standard, xyzt_units)."""
+NRRD_BYTES = {"char|int8": 1, "short|int16": 2, "long|int64|double": 8, "int|float": 4, "": 8}
+"""Bytes of a voxel by what its type holds, the first that fits (teem.sourceforge.net/nrrd/format.html, "type")."""
 SPACES = {
     "right-anterior-superior": (1.0, 1.0, 1.0),
     "left-anterior-superior": (-1.0, 1.0, 1.0),
@@ -107,6 +110,7 @@ def load_nifti(path: Path) -> Mask:
     except ImportError as error:
         raise missing("nibabel", path) from error
     image: Any = nibabel.load(path)
+    check_voxels(path, image.shape, image.get_data_dtype().itemsize)
     code = int(image.header["xyzt_units"]) & 7
     unit = NIFTI_UNITS.get(code, f"with the code {code}")
     labels = whole_numbers(np.squeeze(np.asanyarray(image.dataobj)), path)
@@ -120,7 +124,10 @@ def load_nrrd(path: Path) -> Mask:
         import nrrd
     except ImportError as error:
         raise missing("pynrrd", path) from error
-    check_data_file(path, nrrd.read_header(str(path)))
+    said = nrrd.read_header(str(path))
+    check_data_file(path, said)
+    each = next(size for words, size in NRRD_BYTES.items() if re.search(words, str(said.get("type"))))
+    check_voxels(path, said.get("sizes", ()), each)
     data, header = nrrd.read(str(path))
     rows = np.asarray(header.get("space directions", np.diag(header.get("spacings", np.ones(data.ndim)))), float)
     placed = np.isfinite(rows).any(axis=1)
@@ -148,6 +155,12 @@ def load_nrrd(path: Path) -> Mask:
     unit = stated_unit(header.get("space units", header.get("units", [])), path)
     usual = "mm" if signs and unit is None else None
     return Mask(layers, affine, unit or usual, segments(header), by_custom=usual is not None, remark=remark)
+
+
+def check_voxels(path: Path, sizes: Iterable[int], itemsize: int) -> None:
+    """Raise StudyError before more voxels are unpacked than a machine can hold."""
+    bytes_of_all = float(itemsize) * math.prod(int(size) for size in sizes)
+    check_unpacked(bytes_of_all, path.name, "crop the image to the organ, or store its labels as bytes")
 
 
 def check_data_file(path: Path, header: Mapping[str, Any]) -> None:

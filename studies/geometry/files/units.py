@@ -1,13 +1,17 @@
 """Units of length of mesh files: stated by the user or the file, or recognised by the size of organs."""
 
 import hashlib
+import json
 import re
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
+from urllib.parse import unquote
 
 import numpy as np
 
 from studies.base.errors import StudyError
+from studies.base.within import file_within
 
 UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254}
 GUESSED = ("m", "cm", "mm")
@@ -70,14 +74,13 @@ class Source:
 
     @property
     def sha256(self) -> str | None:
-        """SHA-256 of the bytes of the file (hexadecimal) and of the data file next to an NRRD header, which identifies
-        it at any path; None if it cannot be read."""
+        """SHA-256 of the bytes of the file (hexadecimal) and of the data files that an NRRD header or a glTF names,
+        which identifies it at any path; None if it cannot be read."""
         try:
             content = self.path.read_bytes()
-            detached = DETACHED.search(content) if self.path.suffix.lower() == ".nhdr" else None
-            data = None if detached is None else Path(self.path.parent, detached[1].decode(errors="replace"))
-            if data is not None and data.is_file() and data.parent == self.path.parent:
-                content += data.read_bytes()
+            for name in named_by(self.path.suffix.lower(), content):
+                with suppress(StudyError):  # its reader refuses what lies elsewhere
+                    content += file_within(self.path.parent, name, self.path.name).read_bytes()
             return hashlib.sha256(content).hexdigest()
         except OSError:
             return None
@@ -87,6 +90,19 @@ class Source:
         """Scale, longest side and part, if they are given; JSON-able."""
         given = {"scale": None if self.scale == 1.0 else self.scale, "longest_side": self.longest_side}
         return {key: value for key, value in (given | {"part": self.part}).items() if value is not None}
+
+
+def named_by(suffix: str, content: bytes) -> list[str]:
+    """The data files that a file names."""
+    if suffix == ".nhdr":
+        return [name.decode(errors="replace") for name in DETACHED.findall(content)[:1]]
+    if suffix != ".gltf":
+        return []
+    try:
+        names = [str(buffer.get("uri", "data:")) for buffer in json.loads(content)["buffers"]]
+    except (ValueError, LookupError, TypeError, AttributeError, RecursionError):  # its reader says what is wrong
+        return []
+    return [unquote(name) for name in names if not name.startswith("data:")]
 
 
 def stem_of(path: Path) -> str:

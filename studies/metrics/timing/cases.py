@@ -12,6 +12,7 @@ import numpy as np
 
 from massspring import Free, Setup, simulate
 from studies.base.compile_watch import watching
+from studies.base.doing import doing
 from studies.base.errors import StudyError
 from studies.metrics.timing.protocol import FrameTiming, interleave, pinned
 from studies.metrics.timing.stage_cost import ROWS, stage_times
@@ -58,6 +59,7 @@ def time_cases(root: Path, study: str, cases: Iterable[Case], on_case: Callable[
     with pinned(threads=1) as core:
         for group in groups.values():
             started = time.perf_counter()
+            doing(f"frame times of {group[0].name}")
             with watching() as watch:
                 with warnings.catch_warnings():
                     warnings.simplefilter("ignore", UserWarning)  # the run has stored the warnings of its preparation

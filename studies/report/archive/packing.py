@@ -22,7 +22,7 @@ from rocrate.rocrate import ROCrate
 
 import studies as package
 from massspring.sources import OWN, ROOT
-from studies.base.atomic import is_there, part_beside
+from studies.base.atomic import is_there, part_beside, unwritten
 from studies.base.errors import StudyError
 from studies.catalog.study import Study, command_line
 from studies.exchange.entry import entry_files
@@ -88,14 +88,17 @@ def pack(
     check_current(Ledger(root), studies)
     make_folder(target.parent)
     own = [file.path for study in studies for case in study.cases for file in files_of(case)]
-    with TemporaryDirectory(dir=target.parent, prefix=f"{target.stem}-") as place:
-        stage = Path(place) / "results"  # as commands in report.html name it
-        remarks = gather(root, studies, stage)
-        for path in (*extra, *own):
-            bring(path, stage / path.name)
-        describe(stage, studies, day)
-        files = files_below(stage)
-        write_zip(stage, files, target, day)
+    try:
+        with TemporaryDirectory(dir=target.parent, prefix=f"{target.stem}-") as place:
+            stage = Path(place) / "results"  # as commands in report.html name it
+            remarks = gather(root, studies, stage)
+            for path in (*extra, *own):
+                bring(path, stage / path.name)
+            describe(stage, studies, day)
+            files = files_below(stage)
+            write_zip(stage, files, target, day)
+    except OSError as problem:  # of what is gathered: the zip itself is there whole or not at all
+        raise StudyError(unwritten(target, problem)) from problem
     return len(files) - 1, remarks
 
 

@@ -2,13 +2,17 @@
 
 import io
 import time
+from functools import partial
 
 import pytest
 from rich.console import Console
 
+from studies.base.doing import doing
+from studies.base.processes import run_each
 from studies.cli import progress as shown
 from studies.cli import terminal
 from studies.cli.progress import QUIET_SECONDS, TerminalProgress, words
+from studies.sweep.local import begin
 from studies.sweep.plan import PHYSICS, Planned
 
 
@@ -41,7 +45,7 @@ def test_a_log_has_one_line_on_compiling_and_then_rests():
     console = log()
     with TerminalProgress(console) as progress:
         for name in ("free_frame", "free_frame", "other"):
-            progress.compiling(name)
+            progress.hear(name)
     assert lines(console) == ["compiling free_frame (kept for the next time)"]
     assert QUIET_SECONDS > 1
 
@@ -54,3 +58,36 @@ def test_a_log_hears_of_a_long_piece(monkeypatch):
         progress.begin(PHYSICS, 3)
         time.sleep(0.2)
     assert "physics 0/3 done, 1 s" in lines(console)
+
+
+def say_it(what: str) -> None:
+    doing(what)
+
+
+def test_a_log_says_what_is_waited_for_here_and_in_other_processes(monkeypatch):
+    monkeypatch.setattr(terminal, "QUIET_SECONDS", 0.01)
+    monkeypatch.setattr(shown, "QUIET_SECONDS", 0.0)
+    console, here, there = log(), "frame times of liver", "reference of liver: mesh 3 of 5, 40,000 unknowns"
+    with TerminalProgress(console) as progress:
+        progress.begin(PHYSICS, 1)
+        doing(here)
+        time.sleep(0.1)
+        list(run_each([there], 1, say_it, partial(begin, ()), {}, progress.hear))
+        time.sleep(0.1)
+        progress.advance(PHYSICS, "liver")
+        time.sleep(0.1)
+    said = [line.partition(" s: ")[2] for line in lines(console) if " done, " in line]
+    assert [text for k, text in enumerate(said) if k == 0 or text != said[k - 1]] in (
+        [here, there, ""],
+        ["", here, there, ""],
+    )
+    doing("nothing waits any more")
+    assert len(lines(console)) == len(said) + 1
+
+
+def test_a_command_that_takes_long_says_what_it_does(monkeypatch, capsys):
+    monkeypatch.setattr(terminal, "QUIET_SECONDS", 0.01)
+    with terminal.busy("reading [the] records"):
+        doing("liver-550")
+        time.sleep(0.1)
+    assert "reading [the] records: liver-550, 0 s" in capsys.readouterr().err.splitlines()

@@ -110,3 +110,16 @@ def test_a_missing_file_and_one_with_a_flipped_byte_are_refused(ours, tmp_path):
         read_handed(path)
     with pytest.raises(StudyError, match="there is no file"):
         read_handed(tmp_path / "none.npz")
+
+
+def test_an_npz_that_promises_too_much_is_not_unpacked(tmp_path):
+    """2.4 GB of zeros pack to 2.4 MB; here the directory of the zip alone says so."""
+    path = tmp_path / "a.npz"
+    np.savez(path, t=np.zeros(1), positions=np.zeros((1, 1, 3)))
+    content = path.read_bytes()
+    entry = content.rindex(b"PK\x01\x02")
+    path.write_bytes(content[: entry + 24] + (2_400_000_000).to_bytes(4, "little") + content[entry + 28 :])
+    with pytest.raises(
+        StudyError, match=r"a\.npz holds 2\.4 GB unpacked; at most 2 GB are read: hand in the checkpoints"
+    ):
+        read_handed(path)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from studies.catalog import STUDIES
+from studies.metrics import metrics as module
 from studies.metrics.metric import Metric
 from studies.metrics.metrics import METRICS
 from studies.metrics.table import UNRESOLVED, metric, study_table
@@ -106,3 +107,12 @@ def test_doubtful_is_what_the_reference_knows_less_than_ten_times_better():
     assert not force.unresolved(run(reference=None))
     table = study_table([run(force=(9.0, 0.91, 9.0, 1.82)), run(reference=None)], ["force_error", "min_j"])
     assert table[UNRESOLVED].tolist() == ["force_error", ""]
+
+
+def test_what_is_compared_with_a_reference_obeys_the_scene_wherever_it_is_called():
+    """Charts call metrics by their functions: the chart of all results drew forces of scenes that compare none."""
+    for one in METRICS:
+        if one.quantity is not None and one.quantity not in ALWAYS:
+            assert getattr(module, one.name) is one
+    turned = run(scene=replace(SCENE, quantities=("surface",)))
+    assert np.isnan(module.force_end(turned)) and np.isfinite(module.force_end(run()))

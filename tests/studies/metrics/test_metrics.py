@@ -218,7 +218,7 @@ def test_the_pressure_of_a_lumen_is_that_of_its_own_column():
     volume = np.full((4, 2), EDGE**3 / 2)
     values = {"volume": volume, "volume_target": volume, "pressure": np.tile([50.0, 22.0], (4, 1))}
     attributes = {"volumes": 2, "lumen_column": 1}
-    assert lumen_pressure_error(run(values=values, attributes=attributes)) == pytest.approx(10.0, rel=1e-12)
+    assert lumen_pressure_error.of(run(values=values, attributes=attributes)) == pytest.approx(10.0, rel=1e-12)
     assert np.isnan(lumen_pressure_error(run()))
 
 

@@ -13,8 +13,9 @@ from studies.runs import run as module
 from studies.runs.case import Case
 from studies.runs.prepare import prepare
 from studies.runs.recipes import BODIES, MembraneBody, SurfaceBody, TetrahedralBody
-from studies.runs.run import checkpoint_frames, measure, replay, run_case
+from studies.runs.run import checkpoint_frames, measure, record_of, replay, run_case
 from studies.runs.status import FOLDED, status_of
+from studies.scene.checks import check_scene
 from studies.scene.library.stress import STRESS_SCENES
 from studies.scene.scene import Held, Organ
 from studies.scene.start import InitialConditions
@@ -225,7 +226,7 @@ def test_a_method_that_does_not_apply_is_skipped_with_its_reason(mesh_cache, met
 
 def failure(case) -> str:
     """The message of the failed record that a case must leave, one sentence."""
-    record = measure(case)
+    record = record_of(case)
     assert record.status == Status.FAILED
     assert record.fields == {}
     assert record.message
@@ -295,7 +296,7 @@ def test_attachments_that_overlap_or_miss_fail_in_one_sentence(tmp_path):
     top = Held("top", HalfSpace((0.0, 0.0, 0.04), (0.0, 0.0, -1.0)), Trajectory())
     far = Held("far", HalfSpace((0.0, 0.0, 9.0), (0.0, 0.0, -1.0)))
     body = SurfaceBody()
-    assert measure(tiny_case(scene=file_scene(path, held=(top,)), body=body)).status == Status.OK
+    assert record_of(tiny_case(scene=file_scene(path, held=(top,)), body=body)).status == Status.OK
     assert "same node" in failure(tiny_case(scene=file_scene(path, held=(top, replace(top, name="again"))), body=body))
     assert "holds no node" in failure(tiny_case(scene=file_scene(path, held=(far,)), body=body))
 
@@ -309,3 +310,17 @@ def test_an_obstacle_that_was_inside_in_any_frame_tunnelled(ended, frame):
     verdict, message = status_of(case, replace(history, inside=inside, min_j=-np.ones(FRAMES)))
     assert verdict == Status.TUNNELLED and f"obstacle 1 is or was inside the body in 1 of {FRAMES} frames" in message
     assert status_of(case, replace(history, inside=inside & False))[0] == Status.OK
+
+
+def test_measure_checks_the_scene_as_the_command_does(mesh_cache):
+    """The density of a stone is remarked on; a sphere inside the ball at the start stops the case."""
+    case = tiny_case()
+    stone = replace(case.scene, tissue=replace(case.scene.tissue, density=3e3))
+    (sentence,) = check_scene(stone)
+    record = measure(case.replaced(scene=stone))
+    assert record.status == Status.OK and sentence in record.attributes["warnings"]
+    inside = replace(case.scene, obstacles=(Sphere((0.0, 0.0, 0.0), 0.02, Trajectory()),))
+    with pytest.raises(StudyError) as problem:
+        check_scene(inside)
+    record = measure(case.replaced(scene=inside))
+    assert (record.status, record.message) == (Status.FAILED, str(problem.value))

@@ -1,11 +1,14 @@
 """Hold and probe on a body: by rule, at a side, at a point; and the tissue that belongs to a name."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from studies.base.errors import StudyError
-from studies.geometry import BallRegion, OrganMesh
+from studies.geometry import BallRegion, OrganMesh, organ
 from studies.geometry.mesh.organ_mesh import triangle_areas
+from studies.geometry.organs import liver as liver_module
 from studies.geometry.surface.distance import distance_to_surface
 from studies.scene.chosen_place import GAP, RADIUS, SIDES
 from studies.scene.proposal import HELD, proposal
@@ -54,6 +57,20 @@ def test_a_side_is_held_and_the_other_one_palpated(side):
     assert normal @ SIDES[other] > 0.98 and point @ SIDES[other] == pytest.approx(
         0.5 * np.ptp(points[:, axis]), rel=0.05
     )
+
+
+def test_left_is_the_patients():
+    """The thin lobe of a liver is on the left (studies.geometry.organs.liver); a mask has x to the right, y to the
+    front (NIfTI)."""
+    liver = organ("liver", 300, fill=False)
+    assert "Axes: x to the patient's left, y to the back" in (liver_module.__doc__ or "")
+    left, right = (proposal(liver, side).hold for side in ("left", "right"))
+    spread = [np.ptp(liver.points[region.level(liver.points) <= 0][:, 2]) for region in (left, right)]
+    assert left.point[0] > right.point[0] and spread[0] < 0.7 * spread[1]
+    mask = replace(liver, points=liver.points * (-1, -1, 1), recipe={"file": "a.nii.gz"})  # turned by half a turn
+    for side in ("left", "front"):
+        there, here = (proposal(one, side).hold.point for one in (mask, liver))
+        np.testing.assert_allclose(there * np.array((-1, -1, 1)), here, atol=1e-6)
 
 
 def test_points_are_held_and_palpated_on_the_surface():

@@ -7,7 +7,7 @@ import pytest
 from studies.base.errors import DamagedFile, OpenElsewhere, OtherVersion, StudyError
 from studies.store import opening
 from studies.store.entry import DAMAGED, read_entry
-from studies.store.opening import open_results, sealed
+from studies.store.opening import FLAGS_AT, open_results, sealed
 from studies.store.record import SCHEMA, Field, peek, read_record, write_record
 from tests.studies import made_up_run
 from tests.studies.store.test_record import record
@@ -160,3 +160,16 @@ def test_a_file_that_another_program_has_open_is_that_and_stays(tmp_path):
         assert path.read_bytes() == held
     with pytest.raises(DamagedFile, match="has no checksum any more"):
         peek(path)
+
+
+@pytest.mark.parametrize("bit", range(8))
+def test_a_damaged_mark_is_damage_and_is_replaced(tmp_path, bit):
+    """The byte that says that a program has the file open: with one bit of it flipped, all others are as written."""
+    path = tmp_path / "a.h5"
+    write_record(path, record())
+    whole = path.read_bytes()
+    path.write_bytes(whole[:FLAGS_AT] + bytes([whole[FLAGS_AT] ^ 1 << bit]) + whole[FLAGS_AT + 1 :])
+    with pytest.raises(DamagedFile, match="is cut off or damaged"):
+        read_record(path)
+    write_record(path, record())
+    assert path.read_bytes() == whole

@@ -158,6 +158,24 @@ def test_the_data_of_a_header_lie_in_its_folder(tmp_path):
             opened(Source(folder / "a.nhdr", part="1"))
 
 
+@pytest.mark.parametrize("kind", ["uint8_t", "unsigned char", "short int", "double", "unsigned long long int"])
+def test_a_mask_that_promises_too_many_voxels_is_not_unpacked(tmp_path, kind):
+    path, side = tmp_path / "a.nrrd", {"u": 1261, "s": 1001, "d": 631}[kind[0]] if "long" not in kind else 631
+    head = f"NRRD0004\ntype: {kind}\ndimension: 3\nsizes: {{0}} {{0}} {{0}}\nencoding: gzip\nendian: little\n\n"
+    path.write_bytes(head.format(side).encode() + b"no gzip")
+    with pytest.raises(StudyError, match=r"a\.nrrd holds 2\.0\d GB unpacked; at most 2 GB are read: crop the image"):
+        opened(Source(path))
+    path.write_bytes(head.format(side - 2).encode() + b"no gzip")
+    with pytest.raises(StudyError, match="its packed data are damaged"):
+        opened(Source(path))
+    nibabel.save(nibabel.Nifti1Image(np.zeros((2, 2, 2), np.uint8), np.eye(4)), tmp_path / "a.nii")
+    content = bytearray((tmp_path / "a.nii").read_bytes())
+    content[40:48] = np.array([3, 1300, 1300, 1300], "<i2").tobytes()
+    (tmp_path / "a.nii").write_bytes(content)
+    with pytest.raises(StudyError, match=r"a\.nii holds 2\.2 GB unpacked"):
+        opened(Source(tmp_path / "a.nii"))
+
+
 def test_segments_of_slicer_have_names(tmp_path):
     labels, affine = ellipsoid()
     header = {

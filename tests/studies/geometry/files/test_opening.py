@@ -1,5 +1,8 @@
 """Surfaces in the formats that people have, each with the volume and the parts that it was written with."""
 
+import hashlib
+import json
+
 import meshio
 import numpy as np
 import pytest
@@ -133,3 +136,17 @@ def test_sizes_beyond_all_organs_are_refused_at_once(tmp_path, factor):
         with pytest.raises(StudyError, match="no organ is larger than 5 m"):
             read(path, unit="m")
     assert factor > 1 or "size" in [finding.code for finding in examine(path, unit="m").findings]
+
+
+def test_what_a_gltf_names_belongs_to_it(tmp_path):
+    """Results belong to the numbers, which lie in another file."""
+    buffers = [{"uri": "its%20data.bin", "byteLength": 3}, {"uri": "data:;base64,AAAA"}, {"byteLength": 3}]
+    path = written(tmp_path / "a.gltf", json.dumps({"buffers": buffers}).encode())
+    hashes = set()
+    for content in (None, b"abc", b"abd"):
+        if content is not None:
+            (tmp_path / "its data.bin").write_bytes(content)
+        hashes.add(Source(path).sha256)
+    assert len(hashes) == 3
+    written(path, b"[1]")
+    assert Source(path).sha256 == hashlib.sha256(b"[1]").hexdigest()

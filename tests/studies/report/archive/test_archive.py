@@ -1,6 +1,7 @@
 """An archive holds all that its charts need, describes each file, and draws the charts again; what is damaged, stale or
 no archive is named in a sentence."""
 
+import errno
 import hashlib
 import json
 import os
@@ -220,3 +221,17 @@ def test_nothing_runs_in_an_archive_none_is_packed_again_and_its_machine_is_need
         path.unlink() if content is None else path.write_text(content)
         remarks = load_runs(unpacked, STUDY)[1]
         assert remarks and all("machine.json is" in remark for remark in remarks)
+
+
+@pytest.mark.parametrize("place", ["shutil.copytree", "shutil.copyfileobj", "os.fsync"])
+def test_a_full_disk_is_one_sentence_and_leaves_nothing(finished_sweep, tmp_path, monkeypatch, place):
+    """While the code is gathered, while the zip is written, at its end."""
+    module, name = place.split(".")
+
+    def full(*_, **__):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr({"shutil": shutil, "os": os}[module], name, full)
+    with pytest.raises(StudyError, match=r"the disk is full: free some space and run again"):
+        pack(finished_sweep, [STUDY], tmp_path / "tiny.zip", DAY)
+    assert list(tmp_path.iterdir()) == []
