@@ -31,6 +31,8 @@ WAVERS = 0.1
 """Of the kinetic energy: explicit steps keep the energy of a free swing within so much, to either side."""
 SWINGS = 0.01
 """Bound of the swing at rest: of displacements it is the target of the mean error."""
+LESS = "halve the step, or take a method with a smaller tolerance"
+"""What ends a gain: contact that answers a step late feeds energy in, and so does what multipliers leave of volumes."""
 SHORTENED = 2.0
 """Bound of how many times shorter a load makes the steps."""
 MOVES, PACE = 1e-3, 0.02
@@ -131,7 +133,7 @@ def volume_off(history: History) -> float:
 
 def way_out(signs: dict[str, float]) -> str:
     """What ends an oscillation: that of a sound run decays."""
-    return "halve the step" if signs["gained"] > FEEDS else "give the scene more damping or more time at rest"
+    return LESS if signs["gained"] > FEEDS else "give the scene more damping or more time at rest"
 
 
 def neighbours(kept: Volumes | PointVolumes, lumen: int) -> np.ndarray:

@@ -4,7 +4,7 @@ import numpy as np
 
 from massspring import History
 from studies.runs.case import Case
-from studies.runs.indicators import FEEDS, SHAKES, SWINGS, gained, swing
+from studies.runs.indicators import FEEDS, LESS, SHAKES, SWINGS, gained, swing
 from studies.scene.scene import Scene
 from studies.store.schema import Status
 
@@ -47,7 +47,7 @@ def shaking(scene: Scene, history: History) -> tuple[Status, str]:
     if not fed > (FEEDS if swings > SWINGS else SHAKES):
         return Status.OK, ""
     words = f", and it swings by {100 * swings:.2g} % at the end" if swings > SWINGS else ""
-    return Status.SHAKEN, f"the body gains {100 * fed:.2g} % of its energy by itself{words}; halve the step"
+    return Status.SHAKEN, f"the body gains {100 * fed:.2g} % of its energy by itself{words}; {LESS}"
 
 
 def tunnelling(inside: np.ndarray) -> str:
