@@ -118,4 +118,4 @@ def test_of_several_cuts_the_opening_of_the_worse_counts():
         cut_weights=np.array([1.0, 2.0, 3.0, 4.0]),
         opening=truth * np.array([1.01, 0.99, 1.1, 0.9])[:, None],
     )
-    assert opening_error(made_up) == pytest.approx(10.0)
+    assert opening_error.of(made_up) == pytest.approx(10.0)

@@ -19,7 +19,7 @@ from tests.studies.tiny import SQUEEZE, tiny_case
         ({"frames": 10**7}, "GB; at most 0.5 GB are: ask for fewer frames"),
         ({"body": replace(tiny_case().body, stiffness=1e14)}, "the stability limit is"),
         ({"frames": 1, "dt": 1e-7}, "steps in a frame, whose paths take"),
-        ({"scene": replace(SQUEEZE, duration=float("inf"))}, "the duration is inf s; give a finite one"),
+        ({"scene": replace(SQUEEZE, duration=float("inf"))}, "the duration is inf s; give a finite number"),
     ],
     ids=lambda value: "",
 )
