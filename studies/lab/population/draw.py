@@ -46,7 +46,7 @@ COLUMNS = 24
 
 @dataclass(frozen=True)
 class Population:
-    """So many members of an organ; a larger population of the same seed begins with the smaller one."""
+    """So many members of an entry of RANGES; a larger population of the same seed begins with the smaller one."""
 
     organ: str
     count: int
@@ -65,17 +65,18 @@ def member(organ: str, seed: int, number: int, squeezed: bool = False) -> Scene:
     Raises StudyError for a member on which no place for the probe, or for two planes, is found.
     """
     ranges = RANGES[organ]
+    kind = ranges.scene.organ.shape
     rng = np.random.default_rng([seed, number, zlib.crc32(organ.encode())])
-    parameters = vary(organ, int(rng.integers(2**32)), ranges.spread)
-    if ranges.wall is not None:
-        parameters["wall"] = 1e3 * float(rng.uniform(*ranges.wall))  # shapes take millimetres
+    parameters = vary(kind, int(rng.integers(2**32)), ranges.spread)
+    for name, ends in ranges.own.items():
+        parameters[name] = 1e3 * float(rng.uniform(*ends))  # shapes take millimetres
     modulus = float(rng.uniform(*ranges.shear_modulus))
-    shape = SHAPES[organ](**parameters)
+    shape = SHAPES[kind](**parameters)
     base = ranges.scene
     scene = replace(
         base,
         name=NAME.format(organ=organ, seed=seed, number=number),
-        organ=Organ(organ, parameters),
+        organ=Organ(kind, parameters),
         tissue=replace(base.tissue, shear_modulus=modulus, source=ranges.sources[-1]),
         frames=FRAMES,
         held=tuple(replace(held, region=shape.regions[held.name]) for held in base.held),

@@ -2,6 +2,7 @@
 them right."""
 
 import json
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -42,6 +43,35 @@ def test_a_larger_population_begins_with_the_smaller_one_and_stays_within_its_ra
         assert low - 1e-9 <= min(values) and max(values) <= high + 1e-9 and np.ptp(values) >= 0.5 * (high - low)
 
 
+DRAWN = {
+    "liver": (607.6444312250369, 2400.7738338215486, -0.03914208184863684, -0.07765951317695655, -0.042409744288499314),
+    "kidney": (249.05358558533746, 5756.726577306683, 0.011355246346809393, -0.03920598018739668, -0.00685567206806714),
+    "stomach": (452.6026113372483, 640.0, 0.06536713387680979, -0.0489375049495232, 0.008518721368700945),
+    "spleen": (296.9756658576108, 4124.8045243756505, 0.0, 0.0, -2.7771394904367566),
+    "bladder": (282.7357994310891, 10000.0, 1.0, 1.1021187012336238),
+}
+"""Of member 7 of seed 0, before there were thin livers: sum of its lengths [mm], shear modulus [Pa], and its load."""
+
+
+@pytest.mark.parametrize("name", DRAWN)
+def test_members_of_the_published_populations_are_drawn_to_the_bit(name):
+    scene = member(name, 0, 7)
+    lumen, gravity = scene.lumen, scene.gravity
+    load = scene.obstacles[0].centre if scene.obstacles else lumen.filling.values if lumen else gravity
+    assert (math.fsum(scene.organ.parameters.values()), scene.tissue.shear_modulus, *load) == DRAWN[name]
+
+
+def test_thin_livers_are_thinner_than_all_others_in_the_lengths_of_their_own():
+    thin, usual = (
+        [scene.organ.parameters for scene in Population(name, 12).scenes()] for name in ("thin_liver", "liver")
+    )
+    for length, ends in RANGES["thin_liver"].own.items():
+        low, high = (1e3 * end for end in ends)
+        drawn = [parameters[length] for parameters in thin]
+        assert low <= min(drawn) and max(drawn) <= high < min(parameters[length] for parameters in usual)
+        assert np.ptp(drawn) >= 0.5 * (high - low)
+
+
 def depth_of(scene):
     return np.linalg.norm(np.asarray(scene.obstacles[0].path.displacements)[-1]) - 0.0005
 
@@ -61,9 +91,9 @@ def test_a_probe_starts_clear_of_the_mesh_and_ends_inside_it_and_off_what_is_hel
         assert 0.0 < wall.point[1] - mesh.points[:, 1].max() < 0.003
 
 
-@pytest.mark.parametrize("name", RANGES)
+@pytest.mark.parametrize("name", DRAWN)
 def test_planes_squeeze_the_organ_of_the_member_by_the_drawn_share_and_stay_clear_of_what_is_held(name):
-    """Judged by the meshed organ."""
+    """Judged by the meshed organ; 430 nodes lose the margin of a thin liver."""
     scenes = Population(name, 6, 1, squeezed=True).scenes()
     assert scenes[:2] == Population(name, 2, 1, squeezed=True).scenes()
     for scene in scenes:
