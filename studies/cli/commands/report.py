@@ -39,8 +39,9 @@ def report(
         written, remarks = reports.report(Ledger(results), [*STUDIES, *more], [*named.values()] or None)
     if figures:
         written += reports.draw_figures(results)
-    warn(remarks)
     if not any(path.name == NAME for path in written):
-        raise StudyError(f"nothing is stored in {results}, so there is no page; run `organbench run volume_loss` first")
+        empty = f"nothing is stored in {results}, so there is no page; run `organbench run volume_loss` first"
+        raise StudyError("; ".join([empty, *remarks]))
+    warn(remarks)
     for path in written:
         say(path)
