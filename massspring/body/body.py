@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -48,6 +49,20 @@ class Material:
             value = getattr(self, name)
             if not (np.isfinite(value) and value > 0):
                 raise MassSpringError(f"{name} is {value} {unit}; it must be a positive finite number")
+
+
+class Measured(NamedTuple):
+    """A shape of a body, and what it does to volumes and elements."""
+
+    x: np.ndarray
+    """Positions [m], (n, 3)."""
+    volume: np.ndarray
+    """V_r [m³], (m,)."""
+    least_j: float
+    """Smallest J [1]: of quadratic elements det F at their points (eq. 8.9), as in a reference, of linear ones
+    V_t / V_t0 (eq. 2.3); NaN without elements, or where one is not a number."""
+    local_energy: float
+    """½ b Σ_q w_q (J_q − 1)² [J]; 0 for a body without `local_bulk`."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -189,12 +204,6 @@ class Body:
         """Inertial mass of the nodes [kg], (n,): `inertia` if given, else `mass`."""
         return self.mass if self.inertia is None else self.inertia
 
-    def local_energy(self, x: np.ndarray) -> float:
-        """½ b Σ_q w_q (J_q − 1)² [J] at positions `x` (n, 3) [m]; 0 for a body without `local_bulk`."""
-        if not isinstance(self.kept, PointVolumes):
-            return 0.0
-        return float(0.5 * self.local_bulk * (self.kept.weight * (self.kept.jacobians(x) - 1.0) ** 2).sum())
-
     @property
     def rest_energy(self) -> float:
         """Energy at rest of springs that are taut at rest [J]; reported energies are relative to it."""
@@ -211,16 +220,18 @@ class Body:
         """Of the tissue in each tetrahedron at rest [m³], (k,)."""
         return self.tetrahedron_volumes if self.share is None else self.tetrahedron_volumes * self.share
 
-    def smallest_ratio(self, x: np.ndarray) -> float:
-        """Smallest J [1] at positions `x` (n, 3) [m]: of quadratic elements det F at their points (eq. 8.9), as in a
-        reference, of linear ones V_t / V_t0 (eq. 2.3); NaN without elements, or where one is not a number."""
+    def measured(self, x: np.ndarray) -> Measured:
+        """The body at positions `x` (n, 3) [m]."""
         if isinstance(self.kept, PointVolumes):
-            return float(self.kept.jacobians(x).min())
-        if not len(self.tetrahedra):
-            return float("nan")
-        return float(smallest_ratio(tetrahedron_volumes(x, self.tetrahedra), self.tetrahedron_volumes))
+            j = self.kept.jacobians(x)
+            energy = 0.5 * self.local_bulk * (self.kept.weight * (j - 1.0) ** 2).sum()
+            return Measured(x, self.kept.volumes_of(j, x), float(j.min()), float(energy))
+        least = float("nan")
+        if len(self.tetrahedra):
+            least = float(smallest_ratio(tetrahedron_volumes(x, self.tetrahedra), self.tetrahedron_volumes))
+        return Measured(x, self.kept.measure(x), least, 0.0)
 
-    @property
+    @cached_property
     def size(self) -> float:
         """Diagonal of the bounding box at rest [m]."""
         return float(np.linalg.norm(np.ptp(self.rest, axis=0)))

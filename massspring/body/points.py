@@ -100,7 +100,11 @@ class PointVolumes:
 
     def measure(self, x: np.ndarray) -> np.ndarray:
         """V_r [m³] at positions `x` (n, 3) [m], (m,)."""
-        parts = np.einsum("kq,qr->kr", self.weight * self.jacobians(x), BARYCENTRIC)
+        return self.volumes_of(self.jacobians(x), x)
+
+    def volumes_of(self, j: np.ndarray, x: np.ndarray) -> np.ndarray:
+        """V_r [m³] of J_q (k, 4) at positions `x` (n, 3) [m], (m,)."""
+        parts = np.einsum("kq,qr->kr", self.weight * j, BARYCENTRIC)
         own = np.bincount(self.corner_volume.ravel(), weights=parts.ravel(), minlength=self.tissue_count)
         return own if self.closed is None else np.concatenate([own, self.closed.measure(x)])
 

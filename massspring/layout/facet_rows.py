@@ -1,5 +1,7 @@
 """Builds the arrays for contact inside quadratic facets (kernels.points.facets), once before a run."""
 
+from functools import cache
+
 import numpy as np
 
 from massspring.kernels.points.arrays import FacetRows
@@ -14,6 +16,7 @@ MARGIN = 1.5
 """Factor on the radius of a facet at rest, since it may stretch."""
 
 
+@cache
 def facet_rule() -> tuple[np.ndarray, np.ndarray]:
     """Shape functions of corners and mid-sides at six points, (6, 6), and the weights, (6,), which sum to 1."""
     places, weights = [], []

@@ -224,7 +224,8 @@ def check_loads(boundary: BoundaryConditions) -> str | None:
         ("attachment", boundary.held_displacement),
         ("target of kept volume", boundary.volume_target[:, :, None]),
     ):
-        bad = np.flatnonzero(~np.isfinite(values).all(axis=(0, 2)))
-        if len(bad):
+        finite = np.isfinite(values)
+        if not finite.all():
+            bad = np.flatnonzero(~finite.all(axis=(0, 2)))
             return f"{what} {bad[0]} is no longer finite; correct its path"
     return None

@@ -2,20 +2,17 @@
 
 import numpy as np
 
+from massspring.body.body import Measured
 from massspring.kernels.forces.springs import membrane_energy, spring_energy
 from massspring.layout.state import State
 from massspring.run.setup import Setup
-from massspring.world.obstacles import Probe
 
 
 def kinetic_energy(state: State, mass: np.ndarray | None = None) -> float:
-    """Of the nodes that nothing holds [J], with other masses (n,) [kg] if they are given: forces on held regions are
-    without the inertia of their nodes."""
+    """Of the nodes that nothing holds [J], with other masses (n,) [kg] if they are given, in the order of the state's:
+    forces on held regions are without the inertia of their nodes."""
     v = np.where(state.model.inverse_mass[:, None] > 0.0, state.nodes.v, 0.0)
-    if mass is None:
-        mass = state.model.mass
-    elif state.permutation is not None:
-        mass = mass[np.argsort(state.permutation)]
+    mass = state.model.mass if mass is None else mass
     # Not by `@`: a pool of threads that has computed a product waits for the next at the expense of frames.
     return 0.5 * float(np.einsum("i,ij,ij->", mass, v, v, dtype=np.float64))
 
@@ -36,16 +33,14 @@ class EnergyAccount:
 
     def __init__(self, setup: Setup, state: State, frame: int = 0) -> None:
         self.setup, self.frame = setup, frame
-        solids = sorted(setup.obstacles, key=lambda o: isinstance(o, Probe))  # as impulses are
-        self.paths = [mover.path for mover in (*solids, *setup.attachments)]
         self.rest_energy = setup.body.rest_energy
-        self._look(state)
+        self._look(state, setup.body.measured(state.x.astype(np.float64, copy=False)))
         constrained = setup.method.capabilities.correction in ("limited", "full")
         self.work = self.energy if constrained else np.nan
-        self.force, self.pressure_at_end = np.zeros((len(self.paths), 3)), self.pressure
+        self.force, self.pressure_at_end = np.zeros((len(setup.obstacles) + len(setup.attachments), 3)), self.pressure
 
-    def add(self, state: State, steps: int) -> None:
-        """Adds the next frame, which took so many steps and ended at `state`.
+    def add(self, state: State, measured: Measured, steps: int) -> None:
+        """Adds the next frame, which took so many steps and ended at `state`, measured there.
 
         The force of a step is that of the positions at its begin; half of its change in the frame makes the work of
         second order in the step, and so does the whole of the pressure's.
@@ -56,10 +51,10 @@ class EnergyAccount:
         last = np.concatenate([done.contact_impulse - done.earlier_contact, done.held_impulse - done.earlier_held])
         self.force = last / dt
         times = self.frame * self.setup.clock.frame - np.array([dt, 0.0])
-        ways = np.array([np.diff(path(times), axis=0)[0] for path in self.paths]).reshape(-1, 3)
-        self._look(state)
+        begin, end = self.setup.paths(times)
+        self._look(state, measured)
         self.pressure_at_end = self.pressure + (self.pressure - pressure) / steps
-        self.work += float(done.work[0]) + float(((self.force + 0.5 * (self.force - force)) * ways).sum())
+        self.work += float(done.work[0]) + float(((self.force + 0.5 * (self.force - force)) * (end - begin)).sum())
         self.work += float(0.5 * (ended + self.pressure_at_end) @ (self.target - target)) + self.fallen - fallen
 
     def entered(self, setup: Setup, state: State) -> "EnergyAccount":
@@ -74,11 +69,13 @@ class EnergyAccount:
         """Kinetic and elastic [J]."""
         return self.kinetic + self.elastic
 
-    def _look(self, state: State) -> None:
-        body, x = self.setup.body, state.x.astype(np.float64, copy=False)
+    def _look(self, state: State, measured: Measured) -> None:
+        body, x = self.setup.body, measured.x
         self.kinetic = kinetic_energy(state)
-        self.tissue_kinetic = self.kinetic if body.inertia is None else kinetic_energy(state, body.mass)
-        self.elastic = elastic_energy(state) - self.rest_energy + body.local_energy(x)
+        self.tissue_kinetic = (
+            self.kinetic if body.inertia is None else kinetic_energy(state, self.setup.inside.body.mass)
+        )
+        self.elastic = elastic_energy(state) - self.rest_energy + measured.local_energy
         self.fallen = float(body.mass @ (x - body.rest) @ np.asarray(self.setup.gravity))
         self.pressure = state.lam + state.model.rest_lam
         self.target = self.setup.volume_targets(np.array([self.frame * self.setup.clock.frame]))[0]

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse import csr_array
 
-from massspring.body.body import Body
+from massspring.body.body import Body, Measured
 from massspring.kernels.points.arrays import PointRows
 from massspring.kernels.probe.arrays import COUNTS
 from massspring.layout.facet_rows import facet_rule
@@ -134,7 +134,7 @@ def passage(before: State, was: Body, after: State, now: Body, ns: int) -> Passa
     """The changes by an event that replaced body `was` in state `before` by body `now` in state `after`; `ns`: its wall
     time."""
     energy, changed = (
-        kinetic_energy(state) + elastic_energy(state) - body.rest_energy + body.local_energy(state.x)
+        kinetic_energy(state) + elastic_energy(state) - body.rest_energy + body.measured(state.x).local_energy
         for state, body in ((before, was), (after, now))
     )
     momentum, pushed = (state.model.mass[:, None] * state.nodes.v for state in (before, after))
@@ -185,15 +185,23 @@ class Recorder:
         self.limited = 0
         self.passages: list[Passage] = []
 
-    def record(self, frame: int, state: State, steps: int, ns: tuple[int, int], numbers: Numbers | None = None) -> None:
+    def record(
+        self,
+        frame: int,
+        state: State,
+        measured: Measured,
+        steps: int,
+        ns: tuple[int, int],
+        numbers: Numbers | None = None,
+    ) -> None:
         """Records the state after frame number `frame` (0, 1, …) of so many `steps`, which took so many `ns` of wall
         and of processor time; `numbers` maps to it from the last body, None after the last event."""
-        x = state.x.astype(np.float64, copy=False)
-        x = x if numbers is None else numbers.carried(x)
-        self.volume[frame] = self.volumes.measure(x)
+        measured = measured if numbers is None else self.body.measured(numbers.carried(measured.x))
+        x = measured.x
+        self.volume[frame] = measured.volume
         self.pressure[frame] = state.lam if numbers is None else state.lam[numbers.volumes]
         squeezed = state.rows.most_squeezed.max() if isinstance(state.rows, PointRows) else -np.inf
-        self.scalars["min_j"][frame] = min(self.body.smallest_ratio(x), 1.0 - squeezed)
+        self.scalars["min_j"][frame] = min(measured.least_j, 1.0 - squeezed)
         done = state.diagnostics
         self.contact_force[frame, self.rank] = self._at_end(done.contact_impulse, done.earlier_contact, steps)
         self.held_force[frame] = self._at_end(done.held_impulse, done.earlier_held, steps)
@@ -233,8 +241,9 @@ class Recorder:
         if isinstance(obstacle, Probe):
             return tip_depth(obstacle, x, triangles, t)
         if isinstance(obstacle, Plane):
-            points = np.einsum("qa,fai->fqi", facet_rule()[0], x[self.body.contact_facets]).reshape(-1, 3)
-            return -float(obstacle.gap(np.concatenate([x[self.surface_nodes], points]), t).min())
+            gap = obstacle.gap(x, t)
+            inside = np.einsum("qa,fa->fq", facet_rule()[0], gap[self.body.contact_facets])  # the gap is linear in x
+            return -float(min(gap[self.surface_nodes].min(), inside.min(initial=np.inf)))
         depth, inside = deepest(obstacle, x, self.facets, triangles, t, (self.final, t - self.clock.frame))
         self.inside[frame, o] = inside
         return depth

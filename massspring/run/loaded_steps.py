@@ -7,7 +7,9 @@ import numpy as np
 from scipy.sparse import coo_array, csr_array
 
 from massspring.analysis.stability import StepLimit
+from massspring.body.springs import lengths
 from massspring.kernels.arrays.layout import BoundaryConditions
+from massspring.kernels.forces.springs import largest_strain
 from massspring.kernels.points.arrays import PointRows
 from massspring.kernels.points.elements import measure_into, push_into
 from massspring.layout.state import State
@@ -23,6 +25,9 @@ LATE, AGAIN = 1.25, 3
 """A frame after which this many times its steps are needed is run again with twice as many, so many times at most."""
 FEWER = 0.95
 """Least steps of a frame over those of the frame before: the estimate is late after a sudden load."""
+CHANGED, SETTLED = 0.05, 0.01
+"""Change of a pressure over that at rest, or of a spring over its length at rest, from which steps are counted again,
+and of ω² in a count, over it, up to which that was the last one: ω² changes by as much as pressures and lengths."""
 HOPELESS = 400.0
 """Rise of ω² from which a state counts as burst: no load needs steps so short."""
 SHARE = 0.8
@@ -50,8 +55,10 @@ class LoadedSteps:
         self.nudge = math.sqrt(np.finfo(start.nodes.x.dtype).eps) * body.size
         self.vector = np.random.default_rng(0).standard_normal((body.node_count, 3))
         self.noise = NOISE / np.abs(self.vector).max() * self.vector
+        self.ends, self.length = body.springs.ends, lengths(body.rest, body.springs.ends)
+        self.change = CHANGED * body.rest_pressure
         at_rest = start.moved_to(setup.body.rest)
-        self.at_rest = self._iterated(at_rest, np.zeros_like(start.lam), FIRST)
+        self.at_rest = self.square = self._iterated(at_rest, np.zeros_like(start.lam), FIRST)
         self.steps = self.needed(start)
 
     def advanced(self, stage: Stage, state: State, frame: int, boundary: BoundaryConditions) -> tuple[State, int]:
@@ -63,7 +70,7 @@ class LoadedSteps:
             return stage.setup.method.advance(state, boundary), steps
         while True:
             vector, after = self.vector, stage.setup.method.advance(state, boundary)
-            needed = self.needed(after)
+            needed = self.needed(after) if self._differs(after) else self.counted
             if needed <= LATE * steps or again == 0:
                 self.steps = max(min(needed, 2 * steps), math.ceil(FEWER * steps))
                 return after, steps
@@ -75,12 +82,27 @@ class LoadedSteps:
         if self.limit is None:
             return self.clock.steps
         self.vector = self.vector + self.noise
-        square = self._iterated(state, state.lam, FURTHER) if np.isfinite(state.nodes.v).all() else math.inf
+        before, self.seen = self.square, state
+        self.square = self._iterated(state, state.lam, FURTHER) if np.isfinite(state.nodes.v).all() else math.inf
+        self.settled = abs(self.square - before) <= SETTLED * before
+        self.counted = self._steps_of(self.square, self.limit)
+        return self.counted
+
+    def _differs(self, state: State) -> bool:
+        """Whether steps must be counted again: the load is another than at the last count, or that was not the last."""
+        seen, now = self.seen.rows, state.rows
+        assert isinstance(seen, PointRows) and isinstance(now, PointRows)
+        pairs = (state.lam, self.seen.lam), (now.eased, seen.eased)
+        alike = self.settled and all(np.abs(new - old).max() <= self.change for new, old in pairs)
+        return not (alike and largest_strain(state.nodes.x, self.seen.nodes.x, self.ends, self.length) <= CHANGED)
+
+    def _steps_of(self, square: float, limit: StepLimit) -> int:
+        """Steps of a frame with that ω² [1/s²] and that limit at rest."""
         if not square < HOPELESS * self.at_rest:
             return math.ceil(math.sqrt(HOPELESS)) * self.clock.steps
         rise = math.sqrt(max(square / self.at_rest, 1.0))
-        loaded = StepLimit(rise * self.limit.frequency, self.limit.damping).damped
-        share = max(SHARE, self.clock.longest / self.limit.damped)
+        loaded = StepLimit(rise * limit.frequency, limit.damping).damped
+        share = max(SHARE, self.clock.longest / limit.damped)
         longest = min(self.clock.longest, share * loaded)
         return max(self.clock.steps, math.ceil(self.clock.frame / longest - 1e-9))
 

@@ -32,7 +32,7 @@ from massspring.run.renumber import Numbered, numbered
 from massspring.world.clock import Clock
 from massspring.world.obstacles import Attachment, Capsule, Obstacle, Plane, Probe, Sphere, Surroundings
 from massspring.world.targets import fastest_filling, followed
-from massspring.world.trajectories import Ramp
+from massspring.world.trajectories import Paths, Ramp
 
 
 @dataclass(frozen=True, eq=False)
@@ -191,26 +191,48 @@ class Setup:
         steps = self.clock.steps if steps is None else steps
         dt = self.clock.frame / steps
         t = frame * self.clock.frame + dt * np.arange(1, steps + 1)
-        solids, probes = self.solids, self.probes
+        before, now = self.paths(t - dt), self.paths(t)
+        speed, (anchor, tip) = (now - before) / dt, self._anchors
+        solid, probe, held = self._kinds
         return BoundaryConditions(
             dt=dt,
             **self._unmoved,
-            position=_tracks([o.anchor + o.path(t) for o in solids], len(t)) - self.origin,
-            velocity=_tracks([(o.path(t) - o.path(t - dt)) / dt for o in solids], len(t)),
-            held_displacement=_tracks([a.path(t) for a in self.attachments], len(t)),
-            held_velocity=_tracks([(a.path(t) - a.path(t - dt)) / dt for a in self.attachments], len(t)),
+            position=(anchor + now[:, solid]) - self.origin,
+            velocity=speed[:, solid].copy(),
+            held_displacement=now[:, held].copy(),
+            held_velocity=speed[:, held].copy(),
             volume_target=self.volume_targets(t, easing),
-            tips=Tips(*(_tracks([p.anchor + p.path(u) for p in probes], len(t)) - self.origin for u in (t - dt, t))),
+            tips=Tips(*((tip + there[:, probe]) - self.origin for there in (before, now))),
         )
+
+    @cached_property
+    def paths(self) -> Paths:
+        """Those of solids, thin probes and attachments, in the order of their impulses."""
+        return Paths([mover.path for mover in (*self.solids, *self.probes, *self.attachments)])
+
+    @cached_property
+    def _kinds(self) -> tuple[slice, slice, slice]:
+        """Places of solids, thin probes and attachments among the paths."""
+        solids, probes = len(self.solids), len(self.probes)
+        return slice(solids), slice(solids, solids + probes), slice(solids + probes, None)
+
+    @cached_property
+    def _anchors(self) -> tuple[np.ndarray, np.ndarray]:
+        """What the paths of solids and of thin probes move [m], (o, 3) each."""
+        return _rows([o.anchor for o in self.solids]), _rows([p.anchor for p in self.probes])
 
     def volume_targets(self, t: np.ndarray, easing: Easing | None = None) -> np.ndarray:
         """Target of each kept volume at times `t` (q,) [s], (q, m) [m³]; after an event `easing` adds the remaining
         deviation."""
-        factors = np.ones((len(t), self.body.kept.count))
-        for name, ramp in self.followed.items():
-            factors[:, self.body.kept.names.index(name)] = ramp(t)
-        targets = factors * self.body.rest_volumes
+        targets = np.tile(self.body.rest_volumes, (len(t), 1))
+        for column, ramp in self._ramps:
+            targets[:, column] *= ramp(t)
         return targets if easing is None else targets + easing.left(t)
+
+    @cached_property
+    def _ramps(self) -> list[tuple[int, Ramp]]:
+        """Number of each volume with a target that is followed, and that."""
+        return [(self.body.kept.names.index(name), ramp) for name, ramp in self.followed.items()]
 
 
 def touches_inside(obstacle: Obstacle, body: Body, method: Method) -> bool:
@@ -225,8 +247,3 @@ def touches_inside(obstacle: Obstacle, body: Body, method: Method) -> bool:
 
 def _rows(vectors: list[np.ndarray]) -> np.ndarray:
     return np.array(vectors, dtype=np.float64).reshape(-1, 3)
-
-
-def _tracks(tracks: list[np.ndarray], steps: int) -> np.ndarray:
-    """(q, o, 3), contiguous, also when there is nothing to track."""
-    return np.ascontiguousarray(np.array(tracks, dtype=np.float64).reshape(-1, steps, 3).transpose(1, 0, 2))

@@ -20,9 +20,10 @@ ESCAPED = 20.0
 so far."""
 
 
-def check_state(state: State, body: Body) -> str | None:
-    """Why the run cannot go on, or None: values that are not finite, or nodes that have left."""
-    far = float(np.abs(state.x - body.rest).max())
+def check_state(state: State, x: np.ndarray, body: Body) -> str | None:
+    """Why the run cannot go on from a state with positions `x` (n, 3) [m], or None: values that are not finite, or
+    nodes that have left."""
+    far = float(np.abs(x - body.rest).max())
     if not np.isfinite(far):
         return "positions are no longer finite"
     if not np.isfinite(state.lam).all():
@@ -64,14 +65,16 @@ def simulate(
         own, begin = thread_time_ns(), perf_counter_ns()
         state, steps = loaded.advanced(now, state, frame, boundary)
         taken = perf_counter_ns() - begin, thread_time_ns() - own
-        reason = check_state(state, now.setup.body)
+        x = state.x.astype(np.float64, copy=False)
+        reason = check_state(state, x, now.setup.body)
         if reason is not None:
             return recorder.stopped(frame, "diverged", reason)
         reason = check_probes(state, setup.obstacles)
         if reason is not None:
             return recorder.stopped(frame, "blocked", reason)
-        account.add(state, steps)
-        recorder.record(frame, state, steps, taken, now.last)
+        measured = now.setup.body.measured(x)
+        account.add(state, measured, steps)
+        recorder.record(frame, state, measured, steps, taken, now.last)
         recorder.record_energy(frame, account)
         if setup.events:
             recorder.record_targets(frame, now.targets_after(frame), now.last)

@@ -1,6 +1,7 @@
 """Rigid obstacles and attachments that move along prescribed paths."""
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -47,7 +48,7 @@ class Plane:
         """What the path moves [m], (3,)."""
         return np.asarray(self.point, dtype=np.float64)
 
-    @property
+    @cached_property
     def unit_normal(self) -> np.ndarray:
         """(3,)."""
         return _unit("plane normal", self.normal)

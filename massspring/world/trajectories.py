@@ -1,11 +1,13 @@
 """Values over time: paths of obstacles and attachments, ramps of volumes."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from massspring.errors import MassSpringError
+from massspring.kernels.step.paths import displacements_into
 
 
 def _check_keys(what: str, times: tuple[float, ...], named: str, values: tuple, units: str = "") -> None:
@@ -32,19 +34,30 @@ class Trajectory:
 
     def __call__(self, t: float | np.ndarray) -> np.ndarray:
         """Displacement [m] at time(s) `t` [s], (3,) or (q, 3)."""
-        times, columns = self._keys
-        displacement = np.empty((*np.shape(t), 3))
-        for axis in range(3):
-            displacement[..., axis] = np.interp(t, times, columns[axis])
-        return displacement
+        return self._alone(np.ascontiguousarray(t, dtype=np.float64).ravel())[:, 0].reshape(*np.shape(t), 3)
 
     @cached_property
-    def _keys(self) -> tuple[np.ndarray, np.ndarray]:
-        """Times (k,) and displacements by axis (3, k) as arrays, since a run evaluates them in every frame."""
-        return np.array(self.times), np.array(self.displacements).T.copy()
+    def _alone(self) -> "Paths":
+        return Paths((self,))
 
 
 STILL = Trajectory()
+
+
+class Paths:
+    """Several trajectories that compiled code evaluates together, since a run does so in every frame."""
+
+    def __init__(self, paths: Sequence[Trajectory]) -> None:
+        self.first = np.cumsum([0, *(len(path.times) for path in paths)])
+        self.times = np.array([t for path in paths for t in path.times], dtype=np.float64)
+        keys = [key for path in paths for key in path.displacements]
+        self.keys = np.array(keys, dtype=np.float64).reshape(-1, 3)
+
+    def __call__(self, t: np.ndarray) -> np.ndarray:
+        """Displacements [m] at times `t` (q,) [s], (q, o, 3)."""
+        out = np.empty((len(t), len(self.first) - 1, 3))
+        displacements_into(t, self.first, self.times, self.keys, out)
+        return out
 
 
 @dataclass(frozen=True)

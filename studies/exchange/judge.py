@@ -152,7 +152,7 @@ def measured(fitting: Fitting) -> dict[str, np.ndarray]:
         "penetration": depth,
         "inside": inside.astype(np.int64),
         "iterations": np.zeros((steps, 2), dtype=np.int64),
-        "min_j": np.array([body.smallest_ratio(each) for each in x]),
+        "min_j": np.array([body.measured(each).least_j for each in x]),
         "snapshot_frame": np.array(at) + 1,
         "snapshots": x[at],
         "rest": body.rest,

@@ -36,6 +36,17 @@ def spring_energy(x, ends, rest_length, stiffness):
 
 
 @njit_lean
+def largest_strain(x, earlier, ends, length):
+    """max_e |d_e − d_e'|/L_e [1] of springs of lengths L_e (s,) [m] between two shapes; d_e = x_j − x_i."""
+    square = 0.0
+    for s in range(ends.shape[0]):
+        i, j = ends[s, 0], ends[s, 1]
+        d = minus(minus(row(x, j), row(x, i)), minus(row(earlier, j), row(earlier, i)))
+        square = max(square, dot(d, d) / (length[s] * length[s]))
+    return math.sqrt(square)
+
+
+@njit_lean
 def add_membrane_forces(x, membrane, force):
     """f_b += 2 g_a (x_c − x_b), f_c −= the same [N], (n, 3), with g_a = k_a Δ_a + c_b Δ_c + c_c Δ_b (eq. 4.6).
 

@@ -55,6 +55,16 @@ def cone_volume(x, triangles, o):
 
 
 @compiled
+def cones_into(x, triangles, centre, six):
+    """6 V_f = (x_i − o) · ((x_j − o) × (x_k − o)) [m³] of the cones of triangles over o = `centre` (3,), (f,)."""
+    o = (centre[0], centre[1], centre[2])
+    for f in range(triangles.shape[0]):
+        a, b, c = row(x, triangles[f, 0]), row(x, triangles[f, 1]), row(x, triangles[f, 2])
+        a, n = minus(a, o), cross(minus(b, o), minus(c, o))
+        six[f] = a[0] * n[0] + a[2] * n[2] + a[1] * n[1]  # in this order replays are equal to the bit
+
+
+@compiled
 def tetrahedron_volumes_into(x, tetrahedra, volume):
     """V_t = (1/6) (x_b − x_a) · ((x_c − x_a) × (x_d − x_a)) [m³], (k,) (eq. 2.3). Negative: inverted."""
     for t in range(tetrahedra.shape[0]):

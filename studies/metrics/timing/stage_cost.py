@@ -75,7 +75,7 @@ def run_frames(setup: Setup, state: State, times: StageTimes = UNTIMED, frames: 
                 times.spent[:BETWEEN_FRAMES] - price * times.ended[:BETWEEN_FRAMES], 0.0
             )
             stage_ns[BETWEEN_FRAMES, frame] = taken[0, frame] - times.spent[:BETWEEN_FRAMES].sum()
-        reason = check_state(state, setup.body)
+        reason = check_state(state, state.x, setup.body)
         if reason is not None:
             raise MassSpringError(f"the run broke off while its cost was measured: {reason}; take a smaller dt")
     return taken, stage_ns, state
@@ -173,8 +173,9 @@ def _per_frame(setup: Setup) -> dict[str, float]:
     times = np.zeros((2, clock.frames))
 
     def recording(frame: int) -> None:
-        account.add(state, clock.steps)
-        recorder.record(frame, state, clock.steps, (0, 0))
+        measured = setup.body.measured(state.x.astype(np.float64, copy=False))
+        account.add(state, measured, clock.steps)
+        recorder.record(frame, state, measured, clock.steps, (0, 0))
         recorder.record_energy(frame, account)
 
     for frame in range(clock.frames):

@@ -162,25 +162,25 @@ def solid(request):
 
 @pytest.mark.parametrize("map_", [np.eye(3), SHEARED, MIRRORED], ids=["rest", "sheared", "mirrored"])
 def test_a_linear_map_has_its_determinant_everywhere(solid, map_):
-    assert solid.smallest_ratio(solid.rest @ map_.T) == pytest.approx(np.linalg.det(map_), rel=1e-9)
+    assert solid.measured(solid.rest @ map_.T).least_j == pytest.approx(np.linalg.det(map_), rel=1e-9)
 
 
 def test_the_smallest_counts(solid):
     """One node moved: some elements lose volume, others gain it."""
     x = solid.rest.copy()
     x[np.argmin(np.linalg.norm(x - x.mean(axis=0), axis=1))] += 0.1 * EDGE
-    assert solid.smallest_ratio(x) < 1.0 - 1e-3
+    assert solid.measured(x).least_j < 1.0 - 1e-3
 
 
 @pytest.mark.filterwarnings("ignore:invalid value encountered in det")
 def test_no_number_is_seen(solid):
     x = solid.rest.copy()
     x[-1, 1] = np.nan
-    assert np.isnan(solid.smallest_ratio(x))
+    assert np.isnan(solid.measured(x).least_j)
 
 
 def test_a_surface_has_no_elements(ball_body):
-    assert np.isnan(ball_body.smallest_ratio(ball_body.rest))
+    assert np.isnan(ball_body.measured(ball_body.rest).least_j)
 
 
 def test_a_quadratic_element_is_read_at_its_points():
@@ -192,6 +192,6 @@ def test_a_quadratic_element_is_read_at_its_points():
     x = points.copy()
     x[:, 0] += a * EDGE * (points[:, 0] / EDGE - 1.0) ** 2
     at_points, in_parts = 1.0 + 2.0 * a * (FAR - 1.0), 1.0 - 1.5 * a
-    assert body.smallest_ratio(x) == pytest.approx(at_points, rel=1e-9)
+    assert body.measured(x).least_j == pytest.approx(at_points, rel=1e-9)
     parts = tetrahedron_volumes(x, body.tetrahedra) / body.tetrahedron_volumes
     assert parts.min() == pytest.approx(in_parts, rel=1e-9) and 1.0 - 2.0 * a < 0.0 < at_points < in_parts

@@ -65,7 +65,7 @@ def test_mass_volume_and_springs_of_copies_add_up_to_what_was(quadratic, law, re
 def energy(body, x: np.ndarray) -> float:
     ends, springs = body.springs.ends.astype(int), body.springs
     length = np.linalg.norm(x[ends[:, 0]] - x[ends[:, 1]], axis=1)
-    return float(0.5 * springs.stiffness @ (length - springs.rest_length) ** 2) + body.local_energy(x)
+    return float(0.5 * springs.stiffness @ (length - springs.rest_length) ** 2) + body.measured(x).local_energy
 
 
 def test_copies_lie_in_front_and_carry_what_the_mirror_carries():

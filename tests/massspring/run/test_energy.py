@@ -102,6 +102,6 @@ def test_least_j_is_that_of_all_steps_of_a_frame(quadratic):
         )
         for frames in (1, 1800)
     )
-    at_ends = min(quadratic.smallest_ratio(x) for x in many.snapshots)
+    at_ends = min(quadratic.measured(x).least_j for x in many.snapshots)
     assert one.min_j[0] == pytest.approx(at_ends, abs=0.005)
-    assert at_ends < quadratic.smallest_ratio(one.final) - 0.1
+    assert at_ends < quadratic.measured(one.final).least_j - 0.1

@@ -124,7 +124,7 @@ def measures(body: Body, state) -> dict:
         "momentum": body.mass @ v,
         "turn": (body.mass[:, None] * np.cross(x, v)).sum(axis=0),
         "kinetic": 0.5 * body.mass @ (v**2).sum(axis=1),
-        "elastic": taut + body.local_energy(x),
+        "elastic": taut + body.measured(x).local_energy,
         "volume": body.kept.measure(x).sum(),
     }
 

@@ -1,6 +1,7 @@
 """Steps of frames under load against the largest frequency of the loaded body's stiffness matrix."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -41,6 +42,29 @@ def test_steps_follow_the_largest_frequency_of_the_loaded_body(height):
     wanted = FRAME / (SHARE * replace(LIMIT, frequency=frequency).damped)
     assert taken == pytest.approx(wanted, rel=0.02, abs=1.0)
     assert height > 0.5 or taken > SETUP.clock.steps  # the load matters
+
+
+def counted(watch: LoadedSteps, states) -> tuple[np.ndarray, int]:
+    """The steps that a watch of loads wants after frames that end at `states`, and how often it counted them."""
+    calls, needed = [], watch.needed
+    watch.needed = lambda state: calls.append(state) or needed(state)
+    wanted = []
+    for state in states:
+        stage = SimpleNamespace(setup=SimpleNamespace(method=SimpleNamespace(advance=lambda *_, state=state: state)))
+        watch.advanced(stage, state, 0, None)
+        wanted.append(watch.counted)
+    return np.array(wanted), len(calls)
+
+
+def test_steps_are_counted_again_only_where_the_load_is_another():
+    """A slow compression, a rest, and a load that comes at once: as safe as a count after every frame."""
+    slow = [squeezed(height)[0] for height in np.linspace(1.0, 0.5, 101)]
+    states = [*slow, *[slow[-1]] * 100, slow[0], slow[-1], slow[-1]]
+    watch, always = LoadedSteps(SETUP, SETUP.start()), LoadedSteps(SETUP, SETUP.start())
+    always._differs = lambda state: True
+    (wanted, calls), (best, frames) = counted(watch, states), counted(always, states)
+    assert (wanted >= 0.97 * best - 1).all() and wanted.max() > SETUP.clock.steps
+    assert calls < 0.5 * frames
 
 
 def test_a_clock_without_a_limit_keeps_its_steps():
