@@ -1,5 +1,6 @@
 """The set-up of a run: a body in its surroundings, checked."""
 
+import math
 import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -34,6 +35,9 @@ from massspring.world.obstacles import Attachment, Capsule, Obstacle, Plane, Pro
 from massspring.world.targets import fastest_filling, followed
 from massspring.world.trajectories import Paths, Ramp
 
+EARLY = 1e-9
+"""Of a time: a frame begins at it although round-off puts it earlier."""
+
 
 @dataclass(frozen=True, eq=False)
 class Setup:
@@ -48,6 +52,8 @@ class Setup:
     """[m/s²]."""
     damping: float = 0.0
     """Mass-proportional damping [1/s]."""
+    damping_at_rest: tuple[float, float] | None = None
+    """(t [s], c [1/s]): in frames that begin at t or later, damping is c; None: it stays the same."""
     velocity: np.ndarray | None = None
     """Initial velocities [m/s], (n, 3); None: at rest."""
     targets: Mapping[str, Ramp] = field(default_factory=dict)
@@ -74,7 +80,8 @@ class Setup:
         if self.pairs is not None:
             check_face_pairs(self.pairs, self.method, self.attachments, self.precision, bool(self.probes))
         limited = self.method.capabilities.conditionally_stable
-        check_surroundings(self.gravity, self.damping, self.clock.dt if limited else 0.0)
+        for damping in (self.damping, *(self.damping_at_rest or ())[1:]):
+            check_surroundings(self.gravity, damping, self.clock.dt if limited else 0.0)
         check_nodal("initial velocities", self.velocity, self.body)
         check_nodal("initial positions", self.positions, self.body)
         x = self.body.rest if self.positions is None else self.positions
@@ -174,7 +181,6 @@ class Setup:
         """The boundary conditions that are the same in all frames."""
         solids = self.solids
         return {
-            "damping": float(self.damping),
             "gravity": np.asarray(self.gravity, dtype=np.float64),
             "is_plane": np.array([isinstance(o, Plane) for o in solids], dtype=np.bool_),
             "plane_normal": _rows([o.unit_normal if isinstance(o, Plane) else np.zeros(3) for o in solids]),
@@ -196,6 +202,7 @@ class Setup:
         solid, probe, held = self._kinds
         return BoundaryConditions(
             dt=dt,
+            damping=self.damping_in(frame),
             **self._unmoved,
             position=(anchor + now[:, solid]) - self.origin,
             velocity=speed[:, solid].copy(),
@@ -204,6 +211,11 @@ class Setup:
             volume_target=self.volume_targets(t, easing),
             tips=Tips(*((tip + there[:, probe]) - self.origin for there in (before, now))),
         )
+
+    def damping_in(self, frame: int) -> float:
+        """Damping during frame number `frame` [1/s]."""
+        since, at_rest = self.damping_at_rest or (math.inf, 0.0)
+        return float(at_rest if frame * self.clock.frame >= since * (1.0 - EARLY) else self.damping)
 
     @cached_property
     def paths(self) -> Paths:

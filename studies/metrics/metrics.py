@@ -212,6 +212,19 @@ def sway(run: Run) -> float:
     return PERCENT * float(run.record.attributes.get("sway", np.nan))
 
 
+def heaviness(run: Run) -> float:
+    """Inertial mass of the body over that of its tissue [1]."""
+    return float(run.record.attributes.get("heaviness", np.nan))
+
+
+def unbalanced(run: Run) -> float:
+    """100 × largest outer force at a checkpoint that moves the body, over the largest probed force [%];
+    NaN without a force."""
+    if "force" not in run.case.scene.quantities:
+        return float("nan")
+    return PERCENT * float(run.record.attributes.get("unbalanced", np.nan))
+
+
 def contact_facets(run: Run) -> float:
     """Outer facets with a point within 0.1 % of the size of the probed obstacle at the last checkpoint [1].
 
@@ -332,6 +345,8 @@ METRICS: tuple[Metric, ...] = (
     Metric("penetration", "%", "lower", penetration),
     Metric("alternation", "%", "lower", alternation),
     Metric("sway", "%", "lower", sway),
+    Metric("heaviness", "1", "-", heaviness),
+    Metric("unbalanced", "%", "lower", unbalanced),
     Metric("contact_facets", "1", "higher", contact_facets),
     Metric("contact_turn", "deg", "lower", contact_turn),
     Metric("step_time", "µs", "lower", step_time, spread=_time_spread(step_time)),

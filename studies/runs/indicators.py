@@ -35,6 +35,11 @@ LESS = "halve the step, or take a method with a smaller tolerance"
 """What ends a gain: contact that answers a step late feeds energy in, and so does what multipliers leave of volumes."""
 SHORTENED = 2.0
 """Bound of how many times shorter a load makes the steps."""
+UNBALANCED = 0.03
+"""Bound of the force that moves the body: the target of the force."""
+HEAVIER = 1.0 + 1e-9
+"""Heaviness above which inertia is more than the tissue's."""
+LIGHTER = "take mass='stiffness', a body as heavy as its tissue"
 MOVES, PACE = 1e-3, 0.02
 """Kinetic energy over the largest energy from which a run shows a motion, and bound of the error of its pace."""
 
@@ -52,6 +57,8 @@ def indicators(scene: Scene, body: Body, history: History, lumen: int, keeps: bo
         "gained": gained(history),
         "swing": swing(scene, history),
         "pace": pace(history),
+        "heaviness": float(body.moved_mass.sum() / body.mass.sum()),
+        "unbalanced": unbalanced(scene, body, history),
         "shortened": float(history.steps.max()) / steps,
     }
 
@@ -90,6 +97,19 @@ def pace(history: History) -> float:
     return float(np.sqrt(history.tissue_kinetic[most] / history.kinetic[most]))
 
 
+def unbalanced(scene: Scene, body: Body, history: History) -> float:
+    """Largest sum of the forces of obstacles, held regions and weight at a checkpoint, over the largest probed force:
+    what accelerates the body and overcomes its drag instead of deforming it [1]; NaN where no force is compared."""
+    ends = [int(np.argmin(np.abs(history.t - t))) for t in scene.checkpoints]
+    ends = [frame for frame in ends if frame < history.good_frames]
+    if not (compares_force(scene, history.contact_force, history.held_force) and ends):
+        return float("nan")
+    outer = history.contact_force.sum(axis=1) + history.held_force.sum(axis=1)
+    rest = np.linalg.norm(outer[ends] + body.mass.sum() * np.asarray(scene.gravity), axis=1)
+    force = np.abs(scene.output_force(history.contact_force, history.held_force)[: history.good_frames])
+    return float(rest.max() / (force.max() or np.inf))
+
+
 def remarks(signs: dict[str, float]) -> list[str]:
     """A sentence for each indicator that is beyond its bound."""
     lines = []
@@ -112,6 +132,12 @@ def remarks(signs: dict[str, float]) -> list[str]:
     if abs(signs["pace"] - 1.0) > PACE:
         share, how = 100 * abs(signs["pace"] - 1.0), "fast" if signs["pace"] > 1.0 else "slow"
         lines.append(f"the motion is {share:.0f} % too {how}, by masses that are not the tissue's; take mass='lumped'")
+    if signs["unbalanced"] > UNBALANCED:
+        percent = 100 * signs["unbalanced"]
+        lines.append(
+            f"on the way up to {percent:.2g} % of the force moves the body instead of deforming it; "
+            f"{LIGHTER if signs['heaviness'] > HEAVIER else 'load more slowly, or with less damping'}"
+        )
     if signs["volume_off"] > VOLUME_OFF:
         lines.append(
             f"the kept volume is up to {100 * signs['volume_off']:.2g} % off (bound {100 * VOLUME_OFF:g} %); a body "
@@ -133,7 +159,9 @@ def volume_off(history: History) -> float:
 
 def way_out(signs: dict[str, float]) -> str:
     """What ends an oscillation: that of a sound run decays."""
-    return LESS if signs["gained"] > FEEDS else "give the scene more damping or more time at rest"
+    if signs["gained"] > FEEDS:
+        return LESS
+    return LIGHTER if signs["heaviness"] > HEAVIER else "give the scene more damping or more time at rest"
 
 
 def neighbours(kept: Volumes | PointVolumes, lumen: int) -> np.ndarray:
@@ -170,12 +198,17 @@ def sway(scene: Scene, t: np.ndarray, contact_force: np.ndarray, held_force: np.
     t: ends of the good frames [s], (f,); contact_force: (F, o, 3) [N], held_force: (F, g, 3) [N], F ≥ f.
     """
     last = np.flatnonzero(t > still_from(scene))[-STILL_FRAMES:]
-    among = contact_force if scene.probed.what == "obstacle" else held_force
-    if "force" not in scene.quantities or len(last) < 3 or not scene.probed.number < among.shape[1]:
+    if len(last) < 3 or not compares_force(scene, contact_force, held_force):
         return float("nan")
     force = scene.output_force(contact_force, held_force)[last]
     trend, mean = np.polynomial.Polynomial.fit(last, force, 1), abs(float(force.mean()))
     return float(np.ptp(force - trend(last))) / mean if mean > 0.0 else float("nan")
+
+
+def compares_force(scene: Scene, contact_force: np.ndarray, held_force: np.ndarray) -> bool:
+    """Whether the scene compares a force, and the histories (F, o, 3) and (F, g, 3) have it."""
+    among = contact_force if scene.probed.what == "obstacle" else held_force
+    return "force" in scene.quantities and scene.probed.number < among.shape[1]
 
 
 def still_from(scene: Scene) -> float:

@@ -1,5 +1,6 @@
 """Prepares a case for the mass-spring solver: mesh, body, set-up of the run."""
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from importlib import import_module
@@ -44,6 +45,7 @@ from studies.runs.cutting import (
     opening_of,
     surface_pieces,
 )
+from studies.runs.heavy import Heaviness, heaviness
 from studies.runs.limits import check_size
 from studies.runs.quadratic import check_masses, flat_mesh, quadratic_for
 from studies.runs.recipes import (
@@ -77,6 +79,8 @@ class Prepared:
     tissue: Tissue | None = None
     """Tissue of a body with virtual nodes, which is recorded and whose mesh is `mesh`; None: the body itself is
     recorded."""
+    heaviness: Heaviness | None = None
+    """Of a body that is as heavy as its scene allows."""
 
     @property
     def body(self) -> Body:
@@ -229,12 +233,17 @@ def prepared_on(case: Case, mesh: OrganMesh | QuadraticMesh) -> Prepared:
     check_applies(case, body, bool(targets))
     if isinstance(case.body, SurfaceBody | MembraneBody) and mesh.hollow:
         mesh = mesh.outer()
-    attachments, last, frames = attachments_for(scene, mesh), body, frames_between(scene, case.frames or scene.frames)
+    attachments, frames = attachments_for(scene, mesh), frames_between(scene, case.frames or scene.frames)
     events, opening, limit_before, tissue = (), None, None, None
+    heavy = heaviness(scene, body, attachments) if case.body.mass == "heavy" else None
+    inert = heavy or Heaviness(damping=scene.damping)
+    last = body = inert.of(body)
+    if heavy is not None and heavy.factor == 1.0:
+        warnings.warn(f"mass='heavy' makes the body no heavier than its tissue: {heavy.limit}", stacklevel=2)
     if scene.cuts:
         events, opening, mesh, tissue = cut_of(case, given, body, bool(targets))
         last, limit_before = events[-1].body, limit_of(case, body, attachments)
-    limit = limit_of(case, last, events[-1].attachments if events else attachments)
+    limit = limit_of(case, last, events[-1].attachments if events else attachments, inert.most_damping)
     dt = case.dt_fraction * limit.damped if case.dt == "auto" else float(case.dt)
     check_size(scene.duration, frames, dt, limit, last, len(scene.obstacles) + len(attachments))
     beyond = case.beyond_limit or not case.method.capabilities.conditionally_stable
@@ -246,14 +255,15 @@ def prepared_on(case: Case, mesh: OrganMesh | QuadraticMesh) -> Prepared:
         scene.obstacles,
         attachments,
         scene.gravity,
-        scene.damping,
+        inert.damping,
+        inert.at_rest,
         targets=targets,
         velocity=scene.start and scene.start.velocities(body.rest),
         positions=scene.start.positions(body.rest) if scene.start and scene.start.shaped else None,
         precision=case.precision,
         events=events,
     )
-    return Prepared(mesh, setup, limit, opening, limit_before, tissue)
+    return Prepared(mesh, setup, limit, opening, limit_before, tissue, heavy)
 
 
 def cut_of(
@@ -308,7 +318,9 @@ def _stages(
     return opened_in_stages(mesh, scene.cuts, shares)
 
 
-def limit_of(case: Case, body: Body, attachments: tuple[Attachment, ...]) -> StepLimit:
-    """The step limit of a case for a body with these attachments. Raises MassSpringError."""
+def limit_of(case: Case, body: Body, attachments: tuple[Attachment, ...], damping: float | None = None) -> StepLimit:
+    """The step limit of a case for a body with these attachments, with the `damping` [1/s] of the scene or another.
+    Raises MassSpringError."""
     held = np.concatenate([a.nodes for a in attachments]) if attachments else None
-    return step_limit(body, case.scene.damping, held, case.method.added_stiffness(body))
+    damping = case.scene.damping if damping is None else damping
+    return step_limit(body, damping, held, case.method.added_stiffness(body))

@@ -14,20 +14,23 @@ from studies.scene.scene import Scene
 
 def check_masses(scene: Scene, recipe: BodyRecipe) -> None:
     """Raises DoesNotApply for masses other than those of the tissue in a scene in which inertia matters."""
-    reason = why_inertia_matters(scene) if recipe.mass == "stiffness" else None
+    reason = None if recipe.mass == "lumped" else why_inertia_matters(scene)
     if reason is not None:
-        raise DoesNotApply(f"masses by stiffness do not apply to scene '{scene.name}': {reason}")
+        kind = "heavy masses" if recipe.mass == "heavy" else "masses by stiffness"
+        raise DoesNotApply(f"{kind} do not apply to scene '{scene.name}': {reason}")
 
 
 def quadratic_for(scene: Scene, recipe: QuadraticBody, mesh: QuadraticMesh) -> Body:
-    """The body of quadratic tetrahedra with the volumes of its recipe, and one for a lumen that is filled and closed.
+    """The body of quadratic tetrahedra with the volumes of its recipe, and one for a lumen that is filled and closed;
+    a heavy one as heavy as its tissue.
 
     Raises MassSpringError for a mesh that gives no valid body.
     """
     material = Material(recipe.stiffness * scene.tissue.shear_modulus, scene.tissue.density)
     lumen = mesh.lumen if scene.filled and mesh.hollow else None
     own = with_own_volumes(scene, recipe, mesh)
-    return quadratic_body(mesh.points, mesh.cells, material, lumen, recipe.mass, recipe.contact, own)
+    inertia = "lumped" if recipe.mass == "lumped" else "stiffness"
+    return quadratic_body(mesh.points, mesh.cells, material, lumen, inertia, recipe.contact, own)
 
 
 def with_own_volumes(scene: Scene, recipe: QuadraticBody, mesh: QuadraticMesh) -> np.ndarray:

@@ -69,7 +69,7 @@ class BodyRecipe(metaclass=_ByKind):
         words = {True: "graded ", False: "", ADAPTIVE: "adaptive "}[self.graded] + self.kind + volumes[self.volumes]
         words += ", contact at nodes" if self.contact == "nodes" else ""
         words += ", virtual nodes" if self.cut == VIRTUAL else ""
-        return words if self.mass == "lumped" else words + ", masses by stiffness"
+        return words + {"lumped": "", "stiffness": ", masses by stiffness", "heavy": ", heavy masses"}[self.mass]
 
     @property
     def chosen(self) -> dict[str, Any]:
@@ -162,9 +162,10 @@ class QuadraticBody(BodyRecipe):
     graded: bool | Literal["adaptive"] = False
     """As for a tetrahedral body; mid-side nodes are also shifted towards outlines. "adaptive": elements are halved
     where one solution with reference elements has its largest error indicators (studies.reference.adaptive_mesh)."""
-    mass: Literal["lumped", "stiffness"] = "lumped"
+    mass: Literal["lumped", "stiffness", "heavy"] = "lumped"
     """Inertial mass: the body's own, or "stiffness": the same total mass, distributed in proportion to the stiffness at
-    each node, for longer steps if inertia does not matter (studies.scene.inertia)."""
+    each node, for longer steps if inertia does not matter (studies.scene.inertia); "heavy": more of it, as much as the
+    loads and the slowest swing allow, and more damping where nothing moves (studies.runs.heavy)."""
     volumes: Literal["vertex", "element", "mixed"] = "vertex"
     """Which volumes are kept: one per vertex, with continuous pressures; one per element; "mixed": one per element with
     a node in a held region, at whose edge the pressure jumps, and one per vertex elsewhere."""

@@ -115,23 +115,28 @@ def _record(case: Case, status: Status, message: str, attributes: dict, fields: 
 def _attributes(prepared: Prepared, history: History) -> dict[str, float | int | str]:
     clock, body, cut = prepared.setup.clock, prepared.body, prepared.opening
     shown = None if prepared.tissue is None else prepared.tissue.mesh
-    return {
-        "rest_volume": body.volume,
-        "dt": clock.dt,
-        "dt_limit": prepared.limit.damped,
-        "steps": clock.steps,
-        "frame": clock.frame,
-        "frames": clock.frames,
-        "good_frames": history.good_frames,
-        "nodes": body.node_count if shown is None else len(shown.points),
-        "springs": body.springs.count,
-        "triangles": len(body.triangles if shown is None else shown.triangles),
-        "law": body.law,
-        "skipped_steps": history.singular_steps,
-        "capped_steps": history.limited_corrections,
-        "volumes": body.kept.count,
-        "lumen_column": _lumen_column(prepared),
-    } | ({} if cut is None else {"cut_frame": cut.frame, **_event_attributes(prepared, history)})
+    heavy = {} if prepared.heaviness is None else prepared.heaviness.record
+    return (
+        heavy
+        | {
+            "rest_volume": body.volume,
+            "dt": clock.dt,
+            "dt_limit": prepared.limit.damped,
+            "steps": clock.steps,
+            "frame": clock.frame,
+            "frames": clock.frames,
+            "good_frames": history.good_frames,
+            "nodes": body.node_count if shown is None else len(shown.points),
+            "springs": body.springs.count,
+            "triangles": len(body.triangles if shown is None else shown.triangles),
+            "law": body.law,
+            "skipped_steps": history.singular_steps,
+            "capped_steps": history.limited_corrections,
+            "volumes": body.kept.count,
+            "lumen_column": _lumen_column(prepared),
+        }
+        | ({} if cut is None else {"cut_frame": cut.frame, **_event_attributes(prepared, history)})
+    )
 
 
 def _event_attributes(prepared: Prepared, history: History) -> dict[str, float]:

@@ -86,7 +86,7 @@ def run_seconds(case: Case) -> float:
     scene, body = case.scene, case.body
     wave = math.sqrt(scene.tissue.shear_modulus * body.stiffness / scene.tissue.density)
     limit = STEP[body.kind] * organ_size(scene) / math.sqrt(body.nodes) / wave
-    limit *= STEP_BY_STIFFNESS if body.mass == "stiffness" else 1.0
+    limit *= 1.0 if body.mass == "lumped" else STEP_BY_STIFFNESS
     limit *= HOLLOW_STEP if scene.lumen is not None and body.kind != "surface" else 1.0
     limit *= GRADED_STEP if body.graded else 1.0
     dt = case.dt_fraction * limit if case.dt == "auto" else float(case.dt)

@@ -54,6 +54,8 @@ ATTRIBUTES = {
     "unknowns_per_volume": 81.0,
     "alternation": 0.25,
     "sway": 0.04,
+    "heaviness": 2.5,
+    "unbalanced": 0.06,
     "warnings": "",
 }
 

@@ -14,6 +14,7 @@ from studies.metrics.metric import PERCENT
 from studies.metrics.run import Run
 from studies.report.page.pack import STEP, pack_frames, pack_indices, pack_series
 from studies.report.page.reference_shape import MOST_NODES, from_rest, reference_id
+from studies.runs.indicators import HEAVIER
 from studies.scene.quantities import allowed
 from studies.store.record import Status
 from studies.store.schema import SURFACE
@@ -45,7 +46,7 @@ def case_data(run: Run, again: str) -> dict[str, Any]:
     data = {
         "title": f"{title} · step {step}",
         "scene": case.scene.name,
-        "about": f"{case.scene.title}. Time step {step}; it ended {outcome}.",
+        "about": f"{case.scene.title}. Time step {step}; it ended {outcome}.{masses(run)}",
         "again": again,
         "duration": case.scene.duration,
         "histories": histories(run),
@@ -54,6 +55,15 @@ def case_data(run: Run, again: str) -> dict[str, Any]:
         data["reference"] = reference_points(run)
     surface = recorded_surface(run) or checkpoint_surface(run)
     return data | ({"why": why_still(run)} if surface is None else {"replay": replay_of(run, surface)})
+
+
+def masses(run: Run) -> str:
+    """What a viewer must know of the motion of a body with other masses than its tissue's."""
+    if run.case.body.mass == "lumped" or "heaviness" not in run.record.attributes:
+        return ""
+    times = float(run.record.attributes["heaviness"])
+    heavy = f"{times:.3g} times as heavy as" if times > HEAVIER else "shared otherwise than"
+    return f" Its inertia is {heavy} the tissue's: on the way it does not move as the organ does."
 
 
 def recorded_surface(run: Run) -> Surface | None:

@@ -17,15 +17,17 @@ from massspring import (
     Setup,
     StepLimit,
     make_clock,
+    quadratic_body,
     simulate,
     step_limit,
 )
-from massspring.analysis.stability import largest_frequency, scaled_stiffness
+from massspring.analysis.stability import largest_frequency, scaled_stiffness, slowest_frequency
 from massspring.analysis.stiffness import stiffness_at_rest
 from massspring.body.springs import Springs
-from tests.massspring.conftest import body_of
+from tests.massspring.conftest import SOFT, body_of
 from tests.massspring.kernels.forces.test_forces import forces
 from tests.massspring.methods.test_methods import thrown
+from tests.massspring.quadratic import quadratic_block
 from tests.massspring.rows import CONTESTANTS, rows
 
 SOFTNESS = 1e-10
@@ -68,6 +70,19 @@ def test_the_stiffness_matrix_is_minus_the_derivative_of_the_forces(body):
 def test_the_largest_frequency_is_that_of_a_dense_solver(block_body):
     dense = scaled_stiffness(block_body, np.empty(0, int)).toarray()
     assert largest_frequency(block_body) == pytest.approx(np.sqrt(np.linalg.eigvalsh(dense)[-1]), rel=1e-4)
+
+
+@pytest.mark.parametrize("held", [np.arange(4), np.array([0, 9, 17])], ids=["a few", "three"])
+def test_the_smallest_frequency_is_that_of_a_dense_solver(held):
+    """In the space in which the kept volumes stay; a body that nothing holds, or one node, has none."""
+    body = quadratic_body(*quadratic_block(), SOFT, inertia="stiffness")
+    free = np.delete(np.arange(3 * body.node_count).reshape(-1, 3), held, axis=0).ravel()
+    keeping = null_space(body.kept.jacobian(body.rest)[:, free].toarray())
+    stiffness = keeping.T @ stiffness_at_rest(body)[free][:, free].toarray() @ keeping
+    mass = keeping.T @ np.diag(np.repeat(body.moved_mass, 3)[free]) @ keeping
+    exact = np.sqrt(eigh(stiffness, mass, eigvals_only=True)[0])
+    assert slowest_frequency(body, held) == pytest.approx(exact, rel=2e-2)
+    assert slowest_frequency(body, held[:0]) == slowest_frequency(body, held[:1]) == 0.0
 
 
 KEEPING_ALL_CELLS = ("xpbd", "element_hard")

@@ -5,7 +5,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from massspring import Attachment, Free, ImplicitVolume, Setup, Volumes, simulate, surface_body, tetrahedral_body
+from massspring import (
+    Attachment,
+    Clock,
+    Free,
+    ImplicitVolume,
+    MassSpringError,
+    Setup,
+    Volumes,
+    simulate,
+    surface_body,
+    tetrahedral_body,
+)
 from massspring.body.membranes import membrane_body
 from massspring.kernels.fused.chunk import LANES
 from massspring.layout.allocate import start
@@ -116,3 +127,15 @@ def test_a_body_is_the_same_under_other_numbers(hollow_body):
         assert np.array_equal(y[other.membrane.triangles], x[body.membrane.triangles])
         assert np.array_equal(y[other.tetrahedra], x[body.tetrahedra])
         assert np.array_equal(y[other.triangles], x[body.triangles])
+
+
+def test_damping_changes_where_nothing_moves_any_more():
+    """A free body that flies loses c dt of its speed in each step; a frame that begins at the time counts as later."""
+    body = tetrahedral_body(*block((1, 1, 1)), SOFT)
+    flies = np.full_like(body.rest, 0.1)
+    setup = Setup(body, Free(), Clock(0.1, 6, 100), damping=0.5, damping_at_rest=(0.3, 4.0), velocity=flies)
+    way = simulate(setup, range(1, 7)).snapshots[:, 0, 0] - body.rest[0, 0]
+    speed = 0.1 * np.cumprod(np.repeat([1.0 - 0.5e-3, 1.0 - 4.0e-3], 300))
+    assert np.allclose(way, 1e-3 * np.cumsum(speed)[99::100], rtol=1e-9)
+    with pytest.raises(MassSpringError, match="damping 1000 1/s reverses"):
+        replace(setup, damping_at_rest=(0.3, 1000.0))

@@ -33,6 +33,7 @@ from studies.runs.indicators import (
     still_from,
     sway,
     swing,
+    unbalanced,
     unlike_neighbours,
 )
 from studies.runs.run import measure
@@ -49,6 +50,8 @@ GOOD = {
     "gained": 1e-4,
     "swing": 1e-3,
     "pace": 1.0,
+    "heaviness": 1.0,
+    "unbalanced": 1e-3,
     "shortened": 1.5,
 }
 
@@ -170,7 +173,10 @@ def test_a_checkerboard_counts_and_a_gradient_does_not():
         ({"alternation": 0.6}, "alternate"),
         ({"sway": 2 * SWAYS}, "oscillates by 2 % at the end while nothing outside moves; give the scene more"),
         ({"sway": 2 * SWAYS, "gained": 2 * FEEDS}, "oscillates by 2 % at the end while nothing outside moves; halve"),
+        ({"sway": 2 * SWAYS, "heaviness": 4.0}, "oscillates by 2 % at the end while nothing outside moves; take mass="),
         ({"swing": 2 * SWINGS}, "swings by 2 %"),
+        ({"unbalanced": 0.07}, "up to 7 % of the force moves the body instead of deforming it; load more slowly"),
+        ({"unbalanced": 0.07, "heaviness": 4.0}, "deforming it; take mass='stiffness'"),
         ({"pace": 1.34}, "34 % too fast"),
         ({"pace": 0.9}, "10 % too slow"),
         ({"shortened": 2.5}, "2.5 times shorter"),
@@ -181,6 +187,17 @@ def test_each_indicator_has_a_remark_beyond_its_bound(changed, word):
     assert remarks(GOOD) == [] and remarks(dict.fromkeys(GOOD, np.nan)) == []
     (remark,) = remarks(GOOD | changed)
     assert word in remark
+
+
+@pytest.mark.parametrize(("weight", "share"), [(0.0, 0.2), (1.0, 0.1), (4.0, 0.4)])
+def test_forces_that_do_not_balance_move_the_body(weight, share):
+    """1.2 N of one plane and 1 N of the other at the second checkpoint alone; the weight [0.1 N] pulls against them."""
+    body = quadratic_body(*quadratic_block((1, 1, 1)), SOFT)
+    scene = replace(SQUEEZE, gravity=(0.0, 0.0, 0.1 * weight / body.mass.sum()))
+    made = history(lambda t: np.where(np.isclose(t, 1.56) | np.isclose(t, 1.68), 1.2, 1.0))
+    made.contact_force[:, 1, 2] = 1.0
+    assert unbalanced(scene, body, made) == pytest.approx(share / 1.2, rel=1e-9)
+    assert np.isnan(unbalanced(replace(scene, quantities=("volume",)), body, made))
 
 
 def test_steps_are_compared_with_those_at_rest():

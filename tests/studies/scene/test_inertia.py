@@ -5,8 +5,8 @@ from dataclasses import replace
 import pytest
 
 from massspring import Plane, Trajectory
-from studies.scene.inertia import why_inertia_matters
-from studies.scene.library import SCENES
+from studies.scene.inertia import why_inertia_matters, why_not_heavier
+from studies.scene.library import BALL_INCISED, BLADDER_FILL, SCENES
 from studies.scene.library.ball_clamped import BALL_CLAMPED
 from studies.scene.library.ball_ringing import BALL_RINGING
 from studies.scene.library.ball_squeeze import BALL_SQUEEZE
@@ -50,3 +50,19 @@ def test_scenes_in_which_bodies_swing_or_are_hit_do_not(scene, reason):
 
 def test_a_plane_that_rests_on_its_way_does_not_turn():
     assert why_inertia_matters(replace(LIVER_PRESS, obstacles=(plane(0.0, -0.005, -0.005, -0.01),))) is None
+
+
+@pytest.mark.parametrize(
+    ("scene", "reason"),
+    [
+        (BALL_SQUEEZE, "nothing holds it"),
+        (BALL_INCISED, "a cut"),
+        (BLADDER_FILL, "is filled"),
+        (replace(LIVER_PRESS, gravity=(0.0, 0.0, -9.81)), "its weight"),
+        (LIVER_PRESS, "None"),
+        (SPLEEN_SAG, "None"),
+    ],
+    ids=lambda value: value if isinstance(value, str) else "",
+)
+def test_bodies_with_a_swing_that_the_rule_does_not_know_are_no_heavier(scene, reason):
+    assert reason in str(why_not_heavier(scene))

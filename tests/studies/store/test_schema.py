@@ -49,7 +49,8 @@ def test_what_a_run_writes_is_what_its_tables_list(finished_sweep):
         OWN_FILES,
         ENTRY,
         SECONDS,
-        *(name for name in LAYOUTS["run"][1] if name.startswith("cut_")),
+        *(name for name in LAYOUTS["run"][1] if name.startswith(("cut_", "damping_"))),
+        "heaviness_limit",
         "league",
     }  # with an option
     timing = read_record(timing_file(finished_sweep, "tiny", tiny_case(timed=True)))

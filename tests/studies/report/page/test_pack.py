@@ -1,11 +1,15 @@
 """Packed positions and series are unpacked within the promised precision."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from massspring import Capsule, Plane, Sphere, Trajectory
-from studies.report.page.case_data import BINS, obstacle_of, thinned
+from studies.report.page.case_data import BINS, masses, obstacle_of, thinned
 from studies.report.page.pack import pack_frames, pack_series
+from studies.runs.recipes import QuadraticBody
+from tests.studies.made_up_run import run
 from tests.studies.report.page.unpack import unpack_frames, unpack_series
 
 RANDOM = np.random.default_rng(5)
@@ -63,3 +67,18 @@ def test_obstacles_move_as_the_scene_says():
     assert (ball["radius"], ball["span"]) == (0.02, [0.0, 0.0, 0.0]) and np.allclose(ball["at"], moved)
     rod = obstacle_of(Capsule((0.0, 0.0, 0.1), (0.3, 0.0, 0.1), 0.02, path), times)
     assert np.allclose(rod["span"], [0.3, 0.0, 0.0]) and np.allclose(rod["at"], moved)
+
+
+@pytest.mark.parametrize(
+    ("mass", "heaviness", "words"),
+    [
+        ("lumped", 1.0, ""),
+        ("stiffness", 1.0, "shared otherwise than"),
+        ("heavy", 1.0 + 1e-12, "shared otherwise than"),
+        ("heavy", 6.91, "6.91 times as heavy as"),
+    ],
+)
+def test_the_page_says_of_masses_that_are_not_the_tissues_that_the_motion_is_not_the_organs(mass, heaviness, words):
+    made = run(attributes={"heaviness": heaviness})
+    said = masses(replace(made, case=made.case.replaced(body=QuadraticBody(mass=mass))))
+    assert words in said and ("does not move as the organ does" in said) == bool(words)
