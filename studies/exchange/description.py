@@ -18,7 +18,7 @@ SCHEMA, VERSION = "organbench-scene", 1
 """VERSION increases when a reader of the old format would misread the new one."""
 OURS = (
     *("alternation", "step_time", "frame_time", "frame_time_p99", "frame_cpu", "real_time_cpu"),
-    *("cut_energy", "cut_momentum", "cut_limit", "cut_ms"),
+    *("cut_energy", "cut_momentum", "cut_limit", "cut_ms", "heaviness", "unbalanced"),
 )
 """Metrics that only apply inside this program."""
 OF_CUTS = ("overlap", "piece_worst", "piece_sum_worst")

@@ -345,7 +345,7 @@ METRICS: tuple[Metric, ...] = (
     Metric("penetration", "%", "lower", penetration),
     Metric("alternation", "%", "lower", alternation),
     Metric("sway", "%", "lower", sway),
-    Metric("heaviness", "1", "-", heaviness),
+    Metric("heaviness", "1", "lower", heaviness),
     Metric("unbalanced", "%", "lower", unbalanced),
     Metric("contact_facets", "1", "higher", contact_facets),
     Metric("contact_turn", "deg", "lower", contact_turn),
