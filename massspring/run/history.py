@@ -241,9 +241,11 @@ class Recorder:
         if isinstance(obstacle, Probe):
             return tip_depth(obstacle, x, triangles, t)
         if isinstance(obstacle, Plane):
-            gap = obstacle.gap(x, t)
-            inside = np.einsum("qa,fa->fq", facet_rule()[0], gap[self.body.contact_facets])  # the gap is linear in x
-            return -float(min(gap[self.surface_nodes].min(), inside.min(initial=np.inf)))
+            gap, facets = obstacle.gap(x, t), self.body.contact_facets
+            least = gap[self.surface_nodes].min()
+            if len(facets):  # the gap is linear in x
+                least = min(least, np.einsum("qa,fa->fq", facet_rule()[0], gap[facets]).min())
+            return -float(least)
         depth, inside = deepest(obstacle, x, self.facets, triangles, t, (self.final, t - self.clock.frame))
         self.inside[frame, o] = inside
         return depth

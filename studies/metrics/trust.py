@@ -86,6 +86,11 @@ def verdicts(runs: Sequence[Run]) -> list[Verdict]:
     return [_verdict(scene, *pair) for (scene, _), pair in finest.items()]
 
 
+def is_compared(body: BodyRecipe) -> bool:
+    """Whether sizes of a recipe are compared with each other."""
+    return body.kind == "quadratic" and bool(body.graded)
+
+
 def pairs_of(runs: Sequence[Run]) -> list[tuple[Run, Run]]:
     """Pairs of runs that ended well, of neighbouring sizes of a graded quadratic recipe in a scene, the coarse one
     first."""
@@ -93,9 +98,8 @@ def pairs_of(runs: Sequence[Run]) -> list[tuple[Run, Run]]:
     for group in by_scene(runs).values():
         recipes: dict[BodyRecipe, list[Run]] = {}
         for run in group:
-            body = run.case.body
-            if body.kind == "quadratic" and body.graded and run.record.status == Status.OK:
-                recipes.setdefault(_without_nodes(body), []).append(run)
+            if is_compared(run.case.body) and run.record.status == Status.OK:
+                recipes.setdefault(_without_nodes(run.case.body), []).append(run)
         for sizes in recipes.values():
             sizes.sort(key=lambda run: run.case.body.nodes)
             pairs += [pair for pair in pairwise(sizes) if pair[0].case.body != pair[1].case.body]

@@ -43,13 +43,13 @@ def seal_of(image: bytes | memoryview) -> bytes:
     return (LABEL + f"{len(image)} {hashlib.sha256(image).hexdigest()}".encode()).ljust(SEAL - 1) + b"\n"
 
 
-def check_seal(path: Path) -> None:
-    """Raises DamagedFile unless every byte of a file is as it was written, OtherVersion for HDF5 without a seal, and
-    OSError; about a millisecond per megabyte."""
+def check_seal(path: Path) -> bytes:
+    """The seal of a file. Raises DamagedFile unless every byte is as it was written, OtherVersion for HDF5 without a
+    seal, and OSError; about a millisecond per megabyte."""
     content = memoryview(path.read_bytes())
     head, tail, size = bytes(content[: len(FORMER_LABEL)]), bytes(content[-SEAL:]), len(content)
     if tail == seal_of(content[:-SEAL]):
-        return
+        return tail
     is_hdf5 = head.startswith(SIGNATURE)
     check_not_open(path)
     other_format = is_hdf5 and head[len(SIGNATURE) :][:1] != bytes([SUPERBLOCK])
@@ -102,8 +102,7 @@ def open_results(path: Path | str) -> Iterator[h5py.File]:
     if not is_there(path) or not path.is_file():
         raise StudyError(f"there is no results file {path}: `organbench show` says which cases are stored")
     try:
-        check_seal(path)
-        with reading(path, INDEX_KIND, VIEWS) as file:
+        with reading(path, INDEX_KIND, VIEWS, check_seal(path)) as file:
             yield file
     except StudyError:
         raise

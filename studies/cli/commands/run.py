@@ -20,7 +20,7 @@ from studies.cli.options import case_named
 from studies.cli.progress import TerminalProgress, dry_run
 from studies.cli.terminal import PROGRAM, SMOKE, Results, Smoke, console, say, warn
 from studies.geometry.mesher.jobs import cache_folder
-from studies.metrics.trust import verdicts
+from studies.metrics.trust import is_compared, verdicts
 from studies.reference.reference_solves import STUDY as REFERENCES
 from studies.report.results import refresh
 from studies.report.results import report as write_report
@@ -202,6 +202,7 @@ class Work:
 
 def say_trust(root: Path, study: Study) -> None:
     """Whether two meshes of a scene without a reference agree."""
-    for verdict in verdicts(load_runs(root, study)[0]):
+    compared = tuple(case for case in study.cases if is_compared(case.body))
+    for verdict in verdicts(load_runs(root, replace(study, cases=compared))[0]):
         answer = "yes" if verdict.trusted else "no: use more nodes"
         say(f"{verdict.scene}: trust its best body: {answer}, because {verdict.why}")
