@@ -1,8 +1,7 @@
 """What is stored below a results folder: the one place that says whether a result is there and current.
 
-Nothing of it is kept on disk: the head of a file takes 5 ms to read and check, with its checksum 1 ms more for each
-megabyte, so a command over a thousand results begins within six seconds, and no copy can say anything but what the files
-say.
+Nothing of it is kept on disk: the head of a file takes 5 ms to read and check, and 1 ms more for each megabyte, so a
+command over a thousand results begins within six seconds, and no copy can say anything but what the files say.
 """
 
 from collections.abc import Iterable
