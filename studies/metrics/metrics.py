@@ -218,8 +218,7 @@ def heaviness(run: Run) -> float:
 
 
 def unbalanced(run: Run) -> float:
-    """100 × largest outer force at a checkpoint that moves the body, over the largest probed force [%];
-    NaN without a force."""
+    """100 × largest force at a checkpoint that moves the body, over the largest probed force [%]; NaN without one."""
     if "force" not in run.case.scene.quantities:
         return float("nan")
     return PERCENT * float(run.record.attributes.get("unbalanced", np.nan))

@@ -75,7 +75,9 @@ def record_of(
             return _record(case, Status.FAILED, own, {"warnings": _warning_text(caught)}, {})
     status, message = status_of(case, history)
     keeps = case.method.volume_tol is not None
-    signs = indicators(case.scene, prepared.body, history, _lumen_column(prepared), keeps, prepared.setup.clock.steps)
+    clock = prepared.setup.clock
+    damping = prepared.setup.damping_in(clock.frames - 1)
+    signs = indicators(case.scene, prepared.body, history, _lumen_column(prepared), keeps, clock.steps, damping)
     text = "; ".join(filter(None, [_warning_text(caught), *remarks(signs)]))
     attributes = {**_attributes(prepared, history), **signs, "warnings": text}
     return _record(case, status, message, attributes, _fields(case, prepared, history))

@@ -17,7 +17,7 @@ from tests.studies.made_up_run import ATTRIBUTES, SCENE, run
 
 pytestmark = pytest.mark.lab
 FORCE, MEAN, NONE = (0.5, 0.1, 3.0), (0.2, 0.05, 1.0), (np.nan, np.nan, 1.0)
-SOUND = dict.fromkeys(("alternation", "sway", "swing", "gained", "volume_off", "unbalanced"), 0.0)
+SOUND = dict.fromkeys(("alternation", "sway", "swing", "gained", "volume_off", "unbalanced", "unsettled"), 0.0)
 SOUND |= dict.fromkeys(("pace", "shortened", "heaviness"), 1.0)
 NUMBERS = [2, 3, 62, 17, 18, 19, 67]
 """Of seed 7: a member for each load, none of a scan; at the first places of 62 and 67 the probe comes near the hold."""
