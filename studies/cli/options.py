@@ -9,12 +9,12 @@ from studies.base.errors import StudyError
 from studies.base.lookup import lookup
 from studies.catalog.study import Study
 from studies.runs.case import Case
-from studies.runs.recipes import BODIES
+from studies.runs.recipes import ADAPTIVE, BODIES, QuadraticBody
 from studies.runs.user_code import methods_by_name
 from studies.sweep.find_scene import find_scene
 
 MethodName = Annotated[str, typer.Option(help="see `organbench list methods`")]
-BodyKind = Annotated[str, typer.Option(help="tetrahedral, quadratic or surface")]
+BodyKind = Annotated[str, typer.Option(help="tetrahedral, quadratic, adaptive (quadratic), surface or membrane")]
 SurfaceNodes = Annotated[int, typer.Option(help="surface nodes")]
 SHOWN = 8
 """Cases named where a part of a name fits several."""
@@ -26,10 +26,10 @@ def chosen_case(scene: str, method: str, body: str, nodes: int) -> Case:
     Raises StudyError for a word that names none.
     """
     chosen = find_scene(scene)  # first: a file brings its own methods
-    kind = lookup(body, ("tetrahedral", "quadratic", "surface"), "body")
+    kind = lookup(body, (*BODIES, ADAPTIVE), "body")
     return Case(
         scene=chosen,
-        body=BODIES[kind](nodes),
+        body=QuadraticBody(nodes, graded=ADAPTIVE) if kind == ADAPTIVE else BODIES[kind](nodes),
         method=lookup(method, methods_by_name(), "method")(),
     )
 

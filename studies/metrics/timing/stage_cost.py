@@ -27,7 +27,7 @@ from massspring.run.energy import EnergyAccount
 from massspring.run.history import Recorder
 from massspring.run.loaded_steps import LoadedSteps
 from massspring.run.simulation import check_state
-from massspring.run.stages import Stage
+from massspring.run.stages import Stage, stages_of
 from studies.metrics.timing.protocol import pinned
 from studies.metrics.timing.skips import SKIPS
 from studies.runs.case import Case
@@ -56,18 +56,24 @@ last state."""
 
 
 def run_frames(setup: Setup, state: State, times: StageTimes = UNTIMED, frames: int | None = None) -> TimedFrames:
-    """Runs the first `frames` of a set-up, or all. Raises MassSpringError for a run that diverges."""
-    state = replace(state, diagnostics=state.diagnostics._replace(stage_times=times))
+    """Runs the first `frames` of a set-up, or all, and its events. Raises MassSpringError for a run that diverges."""
+    now, *later = stages_of(setup) if setup.events else [Stage(setup, state)]
+    state = _with_clock(state, times)
     frames = setup.clock.frames if frames is None else frames
     taken, stage_ns = np.zeros((2, frames)), np.zeros((len(ROWS), frames))
     price = end_stage_ns() if times.on[0] else 0.0
-    loaded = LoadedSteps(setup, state)
+    loaded = LoadedSteps(now.setup, state)
     for frame in range(frames):
-        boundary = setup.boundary(frame, steps=loaded.steps)
+        if later and frame == later[0].frame:
+            now = later.pop(0).entered(state)
+            state = _with_clock(now.start, times)
+            loaded = LoadedSteps(now.setup, state)
+        state = now.let_in(state, frame)
+        boundary = now.boundary(frame, loaded.steps)
         if times.on[0]:
             times.spent[:], times.ended[:] = 0, 0
         own, begin = thread_time_ns(), perf_counter_ns()
-        state, _ = loaded.advanced(Stage(setup, state), state, frame, boundary)
+        state, _ = loaded.advanced(now, state, frame, boundary)
         taken[:, frame] = perf_counter_ns() - begin, thread_time_ns() - own
         if times.on[0]:
             # The time of a very short stage may be less than the cost of timing it.
@@ -75,10 +81,14 @@ def run_frames(setup: Setup, state: State, times: StageTimes = UNTIMED, frames: 
                 times.spent[:BETWEEN_FRAMES] - price * times.ended[:BETWEEN_FRAMES], 0.0
             )
             stage_ns[BETWEEN_FRAMES, frame] = taken[0, frame] - times.spent[:BETWEEN_FRAMES].sum()
-        reason = check_state(state, state.x, setup.body)
+        reason = check_state(state, state.x, now.setup.body)
         if reason is not None:
             raise MassSpringError(f"the run broke off while its cost was measured: {reason}; take a smaller dt")
     return taken, stage_ns, state
+
+
+def _with_clock(state: State, times: StageTimes) -> State:
+    return replace(state, diagnostics=state.diagnostics._replace(stage_times=times))
 
 
 def stage_times(setup: Setup) -> np.ndarray:
@@ -166,7 +176,8 @@ def _fastest(timed: list[TimedFrames]) -> np.ndarray:
 
 
 def _per_frame(setup: Setup) -> dict[str, float]:
-    """Time of the work once per frame, outside the frame time: medians [ns]."""
+    """Time of the work once per frame, outside the frame time, with the body after all events: medians [ns]."""
+    setup = setup.later[-1] if setup.events else setup
     clock, begun = setup.clock, setup.start()
     recorder = Recorder(setup.body, clock, setup.obstacles, len(setup.attachments), frozenset[int]())
     account, state = EnergyAccount(setup, begun), setup.method.advance(begun, setup.boundary(0))

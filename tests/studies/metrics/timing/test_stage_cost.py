@@ -11,6 +11,7 @@ from studies.metrics.timing.stage_cost import FRAME, ROWS, SKIPPED, STAGE, cost_
 from studies.runs.prepare import prepare
 from studies.runs.recipes import QuadraticBody, SurfaceBody, TetrahedralBody
 from studies.scene.library.ball_clamped import BALL_CLAMPED
+from studies.scene.library.liver_incised import LIVER_INCISED
 from studies.scene.library.stomach_slide import STOMACH_SLIDE
 from tests.studies.tiny import tiny_case
 
@@ -51,6 +52,12 @@ def test_what_is_left_out_is_named(squeezed):
     assert bare[bare["kind"] == SKIPPED]["what"].tolist() == [NO_CONTACT, *missing]
     assert "contact search" not in set(bare["what"])
     assert len(squeezed[squeezed["kind"] == FRAME]) == 2
+
+
+def test_a_run_that_is_timed_is_cut_where_its_scene_is():
+    prepared = prepare(tiny_case(scene=LIVER_INCISED, body=TetrahedralBody(250), frames=20))
+    setup = prepared.setup
+    assert len(run_frames(setup, setup.start())[2].x) == prepared.body.node_count > setup.body.node_count
 
 
 LEFT_OUT = [
