@@ -7,6 +7,7 @@ factors can be used for any set of points (Sherman, Morrison and Woodbury; Hager
 eq. 6.5), and a semismooth Newton iteration finds the set (Hintermüller, Ito and Kunisch, SIAM J. Optim. 13, 2003).
 """
 
+from collections.abc import Container
 from typing import NamedTuple
 
 import numpy as np
@@ -18,14 +19,14 @@ from reference_fem.contact.faces import FaceTouch, gaps_and_slopes
 from reference_fem.elements.surface import point_positions
 from reference_fem.model.obstacles import gap_into
 from reference_fem.statics.tangent import Tangent
-from reference_fem.system.saddle_point import System
+from reference_fem.system.saddle_point import Evaluation, System
 
 ROUNDS = 20
 """Most sets of points that are tried; 2 to 7 are usual. The set of the last round gives a usable direction in any
 case."""
 
-BATCH = 64
-"""Right-hand sides solved at once: a column then costs a quarter of a single solve, and little memory."""
+BATCH = 32
+"""Points whose influence is computed at once: a column then costs a quarter of a single solve, and little memory."""
 
 MOST = 512
 """Most points that may change: more would cost more than the factorisation that they save."""
@@ -103,10 +104,22 @@ def points_between(system: System, touch: FaceTouch, x: np.ndarray, change: np.n
     return Points(directions, gap[place], m, eps, faces.weights[place], touching, excess, place)
 
 
+def near(system: System, evaluation: Evaluation, x: np.ndarray, change: np.ndarray):
+    """All points that may change, and those at obstacles and between faces."""
+    parts = points_near(system, evaluation.touch, x, change), points_between(system, evaluation.faces, x, change)
+    return together(*parts), parts
+
+
 def together(one: Points, other: Points) -> Points:
     directions = sp.csr_matrix(sp.vstack([one.directions, other.directions]))
     gap, m, eps, area, touching, excess = (np.concatenate(both) for both in zip(one[1:-1], other[1:-1], strict=True))
     return Points(directions, gap, m, eps, area, touching, excess, ())
+
+
+def excess(system: System, evaluation: Evaluation, x: np.ndarray):
+    """By how much the contact forces that the tangent assumes exceed those in the residual, (n free,) [N]."""
+    points = near(system, evaluation, x, np.zeros_like(x))[0]
+    return points.directions[:, system.pattern.free].T @ (points.area * points.excess)
 
 
 class Influence:
@@ -123,11 +136,10 @@ class Influence:
     def of(self, chosen: np.ndarray):
         """Movement of all points off their obstacles per force [m/N], (np, len(chosen))."""
         new = [k for k in chosen if k not in self.columns]
-        for first in range(0, len(new), BATCH):
-            batch = new[first : first + BATCH]
-            pushes = self.pushes[batch].T.toarray(order="F")
+        if new:
+            pushes = self.pushes[new].T.toarray(order="F")
             moves = self.points.directions @ self.tangent.respond(pushes, checked=False)
-            self.columns |= dict(zip(batch, moves.T, strict=True))
+            self.columns |= dict(zip(new, moves.T, strict=True))
         return np.array([self.columns[k] for k in chosen]).reshape(len(chosen), len(self.points.gap)).T
 
     def forces(self, push: np.ndarray):
@@ -137,19 +149,17 @@ class Influence:
 
 def settled(system: System, tangent: Tangent, x: np.ndarray, change: np.ndarray):
     """Newton's change (total,) of x with the contact of the linearised problem settled, and its pressures at obstacles
-    (no, nf, nq) and between faces (nf, nq).
+    (no, nf, nq) and between faces (nf, nq). `change` is that of the tangent, with the forces of `excess`.
 
     The next tangent is based on these pressures: they predict better than the gaps which points will touch.
     """
     touch, faces = tangent.evaluation.touch, tangent.evaluation.faces
-    parts = points_near(system, touch, x, change), points_between(system, faces, x, change)
-    points = together(*parts)
+    points, parts = near(system, tangent.evaluation, x, change)
     influence = Influence(system, tangent, points)
-    change = change + tangent.respond(influence.forces(points.area * points.excess))
     plain = gap = points.gap + points.directions @ change
     push = np.zeros(len(gap))
     for _ in range(ROUNDS):
-        chosen = changed(points, gap)
+        chosen = first_of(points, changed(points, gap), gap, influence.columns)
         if len(set(chosen) | influence.columns.keys()) > MOST:
             break
         goal, moves = np.zeros(len(gap)), influence.of(chosen)
@@ -174,6 +184,14 @@ def pressures(points: Points, gap: np.ndarray):
 def changed(points: Points, gap: np.ndarray):
     """Numbers of the points that touch but are not in the tangent, or are in the tangent but do not touch."""
     return np.flatnonzero((pressures(points, gap) > 0.0) != points.touching)
+
+
+def first_of(points: Points, changed: np.ndarray, gap: np.ndarray, known: Container[int]):
+    """The changed points whose influence is known, and a batch of the others, those with the largest forces: a third of
+    what changes at first changes back once these have changed."""
+    new = np.array([k not in known for k in changed], dtype=bool)
+    force = np.where(new, points.area[changed] * np.abs(points.multiplier - points.penalty * gap)[changed], np.inf)
+    return np.sort(changed[np.argsort(-force, kind="stable")[: BATCH + np.count_nonzero(~new)]])
 
 
 def pushes(points: Points, chosen: np.ndarray, moves: np.ndarray, gap: np.ndarray):

@@ -72,8 +72,7 @@ def solve_step(system: System, state: State, t: float, load: float, more: np.nda
             grip = loads.grip._replace(traction=evaluation.touch.traction)
             loads = loads._replace(multiplier=evaluation.touch.pressure, stiffness=stiffness, grip=grip)
             loads = loads._replace(faces=evaluation.faces.pressure)
-            evaluation = system.evaluate(x, loads)
-        before = evaluation
+        before = evaluation = system.evaluate(x, loads)
     failed = unmet(last, system.settings, arrived, distance, allowed)
     raise StepFailed(f"{system.settings.max_iterations} Newton iterations did not meet: {failed}")
 
@@ -102,10 +101,10 @@ def direction(system: System, evaluation: Evaluation, x: np.ndarray, target: np.
     """
     try:
         tangent = Tangent(system, evaluation)
-        change = tangent.newton(target - x[system.pattern.held])
-        if len(system.rows) or len(system.faces.dofs):
-            return active_set.settled(system, tangent, x, change)
-        return change, NO_GUESS, evaluation.faces.guess
+        lift = target - x[system.pattern.held]
+        if not (len(system.rows) or len(system.faces.dofs)):
+            return tangent.newton(lift), NO_GUESS, evaluation.faces.guess
+        return active_set.settled(system, tangent, x, tangent.newton(lift, active_set.excess(system, evaluation, x)))
     except SingularTangent as singular:
         raise StepFailed(str(singular)) from singular
 
@@ -144,11 +143,11 @@ def unmet(evaluation: Evaluation, settings: NewtonSettings, arrived: bool, dista
 
 def search(system: System, x: np.ndarray, direction: np.ndarray, loads: Loads, before: Evaluation | None):
     """The first of a few halved trial steps that inverts no element and does not raise the error by more than
-    MERIT_GROWTH."""
+    MERIT_GROWTH, and its evaluation without tangent: half of them are the last of their step or of their multiplier."""
     share = 1.0
     while share > 1e-2:
         trial = x + share * direction
-        evaluation = system.evaluate(trial, loads)
+        evaluation = system.evaluate(trial, loads, tangent=False)
         if evaluation.usable and (before is None or evaluation.errors.max() <= MERIT_GROWTH * before.errors.max()):
             return trial, evaluation
         share *= 0.5

@@ -47,8 +47,9 @@ class Tangent:
             change[system.pattern.free] += self.columns @ change[m:]
         return change
 
-    def newton(self, lift: np.ndarray):
-        """Newton's change of all unknowns (total,), by `lift` (m,) at the held ones."""
+    def newton(self, lift: np.ndarray, more: np.ndarray | float = 0.0):
+        """Newton's change of all unknowns (total,), by `lift` (m,) at the held ones, with more forces on the free
+        ones."""
         system, evaluation = self.system, self.evaluation
-        forces = -evaluation.residual[system.pattern.free] - system.pattern.lifting(evaluation.values) @ lift
+        forces = more - evaluation.residual[system.pattern.free] - system.pattern.lifting(evaluation.values) @ lift
         return self.respond(forces, -evaluation.residual[system.field_count :], lift)

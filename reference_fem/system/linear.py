@@ -1,5 +1,6 @@
 """Symmetric indefinite sparse systems: MKL Pardiso if installed, otherwise SciPy's SuperLU."""
 
+import ctypes
 import os
 import shlex
 import sys
@@ -19,7 +20,7 @@ RESIDUAL_LIMIT = 1e-6
 """Largest relative residual of a solve (max norm) before the factors are rejected: Newton only needs a direction,
 good factors leave 1e-10."""
 
-SINGLE_FROM = 20_000
+SINGLE_FROM = 5_000
 """Unknowns from which factors are kept in single precision: half the time and half the memory of double precision.
 Refinement brings a solve below RESIDUAL_LIMIT all the same (Carson and Higham, SIAM J. Sci. Comput. 40, 2018)."""
 
@@ -28,9 +29,12 @@ REFINEMENTS = 3
 one."""
 
 # Pardiso's control vector, numbered as in its manual minus one: own values on; nested dissection; refinement only
-# after perturbed pivots; pivots perturbed below 1e-8; scaling and weighted matching, both advised for saddle points;
-# 2x2 pivots.
-PARDISO_CONTROL = {0: 1, 1: 2, 7: 0, 9: 8, 10: 1, 12: 1, 20: 1}
+# after perturbed pivots; pivots perturbed below 1e-8; no scaling, no matching, pivots as they come. The tangent of a
+# stable body with a finite bulk modulus is quasidefinite, so any order of pivots will do (Vanderbei, SIAM J. Optim. 5,
+# 1995), at half the time of the analysis and four fifths of the factorisation. Indices from 0.
+PARDISO_CONTROL = {0: 1, 1: 2, 7: 0, 9: 8, 10: 0, 12: 0, 20: 0, 34: 1}
+# What is tried after that: scaling and weighted matching, both advised for saddle points; 2x2 pivots.
+PARDISO_AFRESH = {10: 1, 12: 1, 20: 1}
 
 
 def free_bytes():
@@ -73,14 +77,12 @@ def load_pardiso():
 class PardisoFactors:
     """LDLᵀ of an upper triangle (CSR, sorted, full diagonal); the analysis is done once per pattern.
 
-    Large factors are in single precision until `factor` is called with `afresh`.
+    Large factors are in single precision, and pivots are not chosen, until `factor` is called with `afresh`.
     """
 
     def __init__(self, pypardiso: ModuleType):
         self.solver = pypardiso.PyPardisoSolver(mtype=-2)
         self.failure = sys.modules[pypardiso.PyPardisoSolver.__module__].PyPardisoError
-        for index, value in PARDISO_CONTROL.items():
-            self.solver.iparm[index] = value
         self.analysed = self.fresh = False
         self.upper = sp.csr_matrix((1, 1))
 
@@ -90,9 +92,23 @@ class PardisoFactors:
         return self.upper.dtype == np.float32
 
     def call(self, phase: int, b: np.ndarray):
-        """One phase of Pardiso on the matrix and a right-hand side."""
-        self.solver.set_phase(phase)
-        return self.solver._call_pardiso(self.upper, b)
+        """One phase of Pardiso on the matrix and right-hand sides, (n,) or (n, k) in Fortran's order.
+
+        The wrapper's own call counts the indices of the matrix from 1, and turns the solutions into C's order, each
+        time: a fifth of a solve.
+        """
+        x, solver, failed = np.zeros_like(b), self.solver, ctypes.c_int32(0)
+        sizes = (1, 1, solver.mtype, phase, len(b)), (1 if b.ndim == 1 else b.shape[1],)
+        front, count = ([ctypes.byref(ctypes.c_int32(size)) for size in some] for some in sizes)
+        tables = self.upper.data, self.upper.indptr, self.upper.indices, solver.perm
+        arrays = [array.ctypes.data_as(ctypes.POINTER(ctypes.c_int32)) for array in tables]
+        handle = solver.pt.ctypes.data_as(ctypes.POINTER(ctypes.c_int64))
+        control = solver.iparm.ctypes.data_as(ctypes.POINTER(ctypes.c_int32))
+        quiet = ctypes.byref(ctypes.c_int32(0))
+        solver._mkl_pardiso(handle, *front, *arrays, *count, control, quiet, b.ctypes, x.ctypes, ctypes.byref(failed))
+        if failed.value:
+            raise self.failure(failed.value)
+        return x
 
     def needed_bytes(self):
         """Memory for the factors [bytes], after the analysis of the pattern, from Pardiso's iparm(15), (16) and (17)
@@ -101,8 +117,8 @@ class PardisoFactors:
         return 1024 * max(while_analysing, kept + factors)
 
     def factor(self, upper: sp.csr_matrix, afresh: bool = False):
-        """Factorises. Matching and ordering of the first matrix are used for later ones, unless `afresh`; then this and
-        all later factors are in double precision."""
+        """Factorises. The ordering of the first matrix is used for later ones, unless `afresh`; then this and all later
+        factors are in double precision, with pivots matched to this matrix."""
         self.fresh = self.fresh or afresh
         single = len(upper.indptr) > SINGLE_FROM and not self.fresh
         if afresh or not self.analysed:
@@ -111,6 +127,8 @@ class PardisoFactors:
         self.upper = sp.csr_matrix(upper, dtype=np.float32 if single else float)
         nothing = np.zeros(len(upper.indptr) - 1, self.upper.dtype)
         if not self.analysed:
+            for index, value in (PARDISO_CONTROL | (PARDISO_AFRESH if afresh else {})).items():
+                self.solver.iparm[index] = value
             self.solver.iparm[27] = int(single)
             self.call(11, nothing)
             self.analysed = True
@@ -121,8 +139,8 @@ class PardisoFactors:
         """x of K x = b."""
         if not self.single:
             return self.call(33, np.asfortranarray(b))
-        size = max(float(np.abs(b).max()), np.finfo(float).tiny)
-        return size * self.call(33, np.asfortranarray(b / size, np.float32)).astype(float)
+        size, single = max(float(np.abs(b).max()), np.finfo(float).tiny), np.empty(b.shape, np.float32, "F")
+        return size * self.call(33, np.divide(b, size, out=single, casting="same_kind")).astype(float)
 
     def release(self):
         """Releases the memory of MKL, which Python's garbage collector does not see."""
@@ -158,7 +176,8 @@ class ScipyFactors:
 class SymmetricSolver:
     """Solves K x = b for a K given by its upper triangle; checks solutions by their residual.
 
-    Raises SolveError when K is singular to working precision.
+    Factorises D K D, D = |diag K|^-1/2: in K the entries of pressures are 1e-18 of those of displacements. Raises
+    SolveError when K is singular to working precision.
     """
 
     def __init__(self, backend: str = "auto"):
@@ -166,11 +185,16 @@ class SymmetricSolver:
         if backend == "pardiso" and pypardiso is None:
             raise SolveError("the solver 'pardiso' was asked for but pypardiso is not installed: use 'auto'")
         self.factors = PardisoFactors(pypardiso) if pypardiso else ScipyFactors()
-        self.upper = sp.csr_matrix((1, 1))
+        self.upper, self.scale = sp.csr_matrix((1, 1)), np.ones(1)
 
     def factor(self, upper: sp.csr_matrix):
         """Factorises K, given by its upper triangle; raises SingularTangent."""
-        self.upper = upper
+        size = np.abs(upper.diagonal())
+        self.scale = 1.0 / np.sqrt(np.where(size > 0.0, size, 1.0))
+        rows = np.repeat(self.scale, np.diff(upper.indptr))
+        scaled = upper.data * rows * self.scale[upper.indices]
+        pattern = (one.astype(np.int32, copy=False) for one in (upper.indices, upper.indptr))
+        self.upper = sp.csr_matrix((scaled, *pattern), shape=upper.shape)
         self.try_factor(afresh=False)
 
     def try_factor(self, afresh: bool):
@@ -183,13 +207,15 @@ class SymmetricSolver:
             ) from problem
 
     def solve(self, b: np.ndarray, checked: bool = True):
-        """x with |K x - b| <= RESIDUAL_LIMIT |b|, of the shape of b, (n,) or (n, k) for k right-hand sides at once.
+        """x with |D (K x - b)| <= RESIDUAL_LIMIT |D b|, of the shape of b, (n,) or (n, k) for k right-hand sides.
 
         One fresh analysis in double precision is tried before giving up. checked=False skips the residual: for further
         right-hand sides with factors that another one has checked. The check takes as long as the solve.
         """
+        scale = self.scale.reshape(-1, *[1] * (b.ndim - 1))
+        b = scale * b
         if not checked:
-            return self.factors.solve(b)
+            return scale * self.factors.solve(b)
         x, misfit = self.refined(b)
         if misfit > RESIDUAL_LIMIT:
             self.try_factor(afresh=True)
@@ -200,10 +226,10 @@ class SymmetricSolver:
                 f"(relative residual {misfit:.1e}, limit {RESIDUAL_LIMIT:.0e}): part of the body may be free to move, "
                 f"hold it"
             )
-        return x
+        return scale * x
 
     def refined(self, b: np.ndarray):
-        """(x from the factors, refined if its residual is too large; largest entry of the residual over that of b)."""
+        """(x of D K D x = b, refined if its residual is too large; largest entry of the residual over that of b)."""
         x, size = self.factors.solve(b), np.abs(b).max() or 1.0
         for attempt in range(REFINEMENTS + 1):
             with np.errstate(invalid="ignore", over="ignore"):

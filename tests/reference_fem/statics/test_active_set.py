@@ -64,7 +64,7 @@ def test_a_settled_change_solves_the_linearised_contact_problem(guessed):
         guess[(guess < 0.7) | (point_positions(x, system.surface)[..., 2] < 0.9)] = 0.0
         evaluation = system.evaluate(x, loads._replace(guess=guess))
     tangent = Tangent(system, evaluation)
-    plain = tangent.newton(np.zeros(len(system.pattern.held)))
+    plain = tangent.newton(np.zeros(len(system.pattern.held)), active_set.excess(system, evaluation, x))
     change, pressure, _ = active_set.settled(system, tangent, x, plain)
     left, t, points = imbalance(system, evaluation, x, change)
     scale = np.sum(points.area * t)

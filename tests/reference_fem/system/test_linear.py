@@ -22,12 +22,12 @@ from tests.reference_fem.bodies import block, symmetry
 BACKENDS = ["scipy"] + (["pardiso"] if importlib.util.find_spec("pypardiso") else [])
 
 
-def saddle_matrix(n=40, seed=0):
+def saddle_matrix(n=40, seed=0, least=1e-6):
     """Symmetric indefinite, with a tiny lower-right block like that of a nearly incompressible solid."""
     rng = np.random.default_rng(seed)
     B = rng.standard_normal((n // 4, n))
     K = rng.standard_normal((n, n))
-    return np.block([[K @ K.T + n * np.eye(n), B.T], [B, -1e-6 * np.eye(n // 4)]])
+    return np.block([[K @ K.T + n * np.eye(n), B.T], [B, -least * np.eye(n // 4)]])
 
 
 def pulled():
@@ -113,6 +113,17 @@ def test_what_single_precision_cannot_solve_is_factorised_in_double(monkeypatch)
     assert not solver.factors.single
     solver.factor(upper(A + np.eye(60)))
     assert not solver.factors.single
+    solver.release()
+
+
+@pytest.mark.skipif(len(BACKENDS) == 1, reason="pypardiso is not installed")
+def test_unknowns_in_other_units_need_no_choice_of_pivots(monkeypatch):
+    """Pressures in units in which their entries are 1e-18 of the others (the mutant: no scaling)."""
+    solver, units = single_solver(monkeypatch), np.where(np.arange(50) < 40, 1.0, 1e-9)
+    K, b = saddle_matrix(least=1.0), np.random.default_rng(5).standard_normal(50)
+    solver.factor(upper(units[:, None] * K * units))
+    assert np.abs(K @ (units * solver.solve(units * b)) - b).max() <= 1e-5
+    assert solver.factors.single
     solver.release()
 
 
