@@ -126,9 +126,17 @@ def cofactor_into(F: np.ndarray, cof: np.ndarray):
 
 @compiled()
 def response_into(
-    F: np.ndarray, p: float, parameters: np.ndarray, H: np.ndarray, P: np.ndarray, A: np.ndarray, scratch: np.ndarray
+    F: np.ndarray,
+    p: float,
+    parameters: np.ndarray,
+    H: np.ndarray,
+    P: np.ndarray,
+    A: np.ndarray,
+    scratch: np.ndarray,
+    tangent: bool,
 ):
-    """P = dW/dF (3, 3) [Pa], A = dP/dF (9, 9) [Pa], H = F^-T; returns J, and J <= 0 leaves the rest unset.
+    """P = dW/dF (3, 3) [Pa], H = F^-T and, if tangent, A = dP/dF (9, 9) [Pa]; returns J, and J <= 0 leaves the rest
+    unset.
 
     With m = 2 c1 J^-2/3: P = m (F - I1/3 H) + p J H and, row iJ, column kL,
     A = m (1 - 2/3 (F⊗H + H⊗F)) + (2/9 m I1 + p J) H⊗H + (m I1/3 - p J) H_iL H_kJ.
@@ -147,6 +155,8 @@ def response_into(
     for i in range(3):
         for r in range(3):
             P[i, r] = m * F[i, r] - crossed * H[i, r]
+            if not tangent:
+                continue
             for k in range(3):
                 for s in range(3):
                     A[3 * i + r, 3 * k + s] = (

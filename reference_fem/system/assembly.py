@@ -86,7 +86,7 @@ def integrate_element(
         for a in range(len(constraints)):
             p += pressures[q, a] * ue[3 * count + a]
         deformation_into(ue, G, functions, F)
-        J = response_into(F, p, parameters, H, P, A, scratch)
+        J = response_into(F, p, parameters, H, P, A, scratch, tangent)
         smallest = min(smallest, J)
         if not J > 0.0:
             return J

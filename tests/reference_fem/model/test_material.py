@@ -28,7 +28,7 @@ def state():
 def compiled(law, F, p):
     """(J, P, A) of the compiled law."""
     H, P, A = np.empty((3, 3)), np.empty((3, 3)), np.empty((9, 9))
-    J = response_into(np.ascontiguousarray(F), p, law.parameters, H, P, A, np.empty((3, 3, 3)))
+    J = response_into(np.ascontiguousarray(F), p, law.parameters, H, P, A, np.empty((3, 3, 3)), True)
     return J, P, A
 
 
