@@ -7,11 +7,11 @@ import numpy as np
 from scipy.sparse import coo_array, csr_array
 
 from massspring.analysis.stability import StepLimit
-from massspring.body.springs import lengths
+from massspring.body.springs import Springs, lengths
 from massspring.kernels.arrays.layout import BoundaryConditions
 from massspring.kernels.forces.springs import largest_strain
 from massspring.kernels.points.arrays import PointRows
-from massspring.kernels.points.elements import measure_into, push_into
+from massspring.kernels.points.elements import forces_into
 from massspring.layout.state import State
 from massspring.run.setup import Setup
 from massspring.run.stages import Stage
@@ -43,15 +43,12 @@ class LoadedSteps:
 
     def __init__(self, setup: Setup, start: State) -> None:
         self.clock, self.steps = setup.clock, setup.clock.steps
-        follows = isinstance(start.rows, PointRows) and setup.method.capabilities.correction == "limited"
-        self.limit = setup.clock.limit if follows and setup.method.capabilities.conditionally_stable else None
-        if self.limit is None:
+        can, rows, body = setup.method.capabilities, start.rows, setup.inside.body
+        self.limit = setup.clock.limit if can.correction == "limited" and can.conditionally_stable else None
+        if self.limit is None or not isinstance(rows, PointRows):
+            self.limit = None
             return
-        body = setup.inside.body
-        # Springs without length act on each axis alone: a matrix of nodes, with a ninth of the numbers of one of axes.
-        (i, j), k = body.springs.ends.T.astype(np.int64), body.springs.stiffness
-        entries = np.concatenate([k, k, -k, -k]), (np.r_[i, j, i, j], np.r_[i, j, j, i])
-        self.springs = csr_array(coo_array(entries, shape=(body.node_count, body.node_count)))
+        self.springs = None if rows.elastic else _stiffness(body.springs, body.node_count)
         self.nudge = math.sqrt(np.finfo(start.nodes.x.dtype).eps) * body.size
         self.vector = np.random.default_rng(0).standard_normal((body.node_count, 3))
         self.noise = NOISE / np.abs(self.vector).max() * self.vector
@@ -113,21 +110,28 @@ class LoadedSteps:
         assert isinstance(rows, PointRows)
         rows = rows._replace(most_squeezed=np.full_like(rows.most_squeezed, -np.inf))  # nudges are no steps
         rows.lam[:] = lam + state.model.rest_lam
-        begin, square = self._push(rows, x), 0.0
+        begin, square = self._force(rows, x), 0.0
         for _ in range(count):
             q = self.vector
             scale = self.nudge / np.abs(q).max()
-            force = self.springs @ q - (self._push(rows, x + scale * q) - begin) / scale
-            after = weight * force
+            force = (begin - self._force(rows, x + scale * q)) / scale
+            after = weight * (force if self.springs is None else force + self.springs @ q)
             square = float(np.vdot(q, after) / np.vdot(q, q))
             self.vector = after / np.abs(after).max()
         return square
 
     @staticmethod
-    def _push(rows: PointRows, x: np.ndarray) -> np.ndarray:
-        """The force of all volumes and of the local pressure at positions `x` (n, 3) [m], (n, 3) [N]."""
-        padded = np.zeros((len(x), 4), dtype=rows.tile.dtype)  # the kernels work in one precision
+    def _force(rows: PointRows, x: np.ndarray) -> np.ndarray:
+        """The force of all points at positions `x` (n, 3) [m], with their springs if they are elastic, (n, 3) [N]."""
+        padded = np.zeros((len(x), 4), dtype=rows.exact.tile.dtype)  # the kernels work in one precision
         padded[:, :3] = x
-        measure_into(rows, padded[:, :3].copy(), padded)
-        push_into(rows, rows.lam)
-        return rows.push.copy()
+        forces_into(rows, padded[:, :3].copy(), padded, rows.lam)
+        return rows.exact.force[:, :3].copy()
+
+
+def _stiffness(springs: Springs, nodes: int) -> csr_array:
+    """Springs without length act on each axis alone: a matrix of nodes, with a ninth of the numbers of one of axes
+    [N/m]."""
+    (i, j), k = springs.ends.T.astype(np.int64), springs.stiffness
+    entries = np.concatenate([k, k, -k, -k]), (np.r_[i, j, i, j], np.r_[i, j, j, i])
+    return csr_array(coo_array(entries, shape=(nodes, nodes)))

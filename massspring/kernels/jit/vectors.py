@@ -36,7 +36,7 @@ def load(table: np.ndarray, row: int, column: int) -> Any:
 
 
 def save(vector: Any, table: np.ndarray, at: int) -> None:
-    """The lanes into a flat table from `at` on."""
+    """The lanes into a flat table from `at` on; rounded where it is of single precision."""
     table[at : at + len(vector)] = vector
 
 
@@ -44,6 +44,14 @@ def gather(padded: np.ndarray, nodes: np.ndarray, row: int, column: int) -> tupl
     """x, y and z of as many nodes as a register has lanes; `padded` (n, 4), so that one load fetches a node."""
     x, y, z, _ = padded[nodes[row, column : column + lanes_of(padded)]].T
     return x, y, z
+
+
+def scatter(vectors: tuple[Any, Any, Any], padded: np.ndarray, nodes: np.ndarray, row: int, column: int) -> None:
+    """Adds x, y and z of each lane to the row of its node, the inverse of `gather`; lanes in their order, since several
+    may name one node."""
+    lanes = lanes_of(padded)
+    for lane, node in enumerate(nodes[row, column : column + lanes]):
+        padded[node, :3] += [component[lane] for component in vectors]
 
 
 def root(vector: Any) -> Any:
@@ -198,7 +206,9 @@ def _load(context: Any, builder: Any, signature: Any, args: Any) -> Any:
 def _save(context: Any, builder: Any, signature: Any, args: Any) -> Any:
     kinds = signature.args
     pointer = _address(context, builder, kinds[1], args[1], [(args[2], kinds[2])])
-    builder.store(args[0], builder.bitcast(pointer, args[0].type.as_pointer()), align=_bytes(kinds[1]))
+    vector, target = args[0], ir.VectorType(pointer.type.pointee, args[0].type.count)
+    vector = vector if vector.type == target else builder.fptrunc(vector, target)
+    builder.store(vector, builder.bitcast(pointer, target.as_pointer()), align=_bytes(kinds[1]))
     return context.get_dummy_value()
 
 
@@ -265,6 +275,67 @@ def _turned_single(builder: Any, rows: list[Any]) -> list[Any]:
 
     even, odd = ([picked(*two, begin, begin + 2) for two in (quarters[:2], quarters[2:])] for begin in (0, 1))
     return [picked(*even, 0, 2), picked(*odd, 0, 2), picked(*even, 1, 3)]
+
+
+@_generates(
+    scatter,
+    lambda vectors, padded, nodes, row, column: types.void,
+    types.UniTuple,
+    types.Array,
+    types.Array,
+    types.Integer,
+    types.Integer,
+)
+def _scatter(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+    _, padded, nodes, row_kind, column_kind = signature.args
+    first = _address(context, builder, nodes, args[2], [(args[3], row_kind), (args[4], column_kind)])
+    base = context.make_array(padded)(context, builder, args[1]).data
+    four, word = ir.VectorType(base.type.pointee, 4), context.get_value_type(types.intp)
+    turned = _rows_double if padded.dtype.bitwidth == 64 else _rows_single
+    for lane, row in enumerate(turned(builder, cgutils.unpack_tuple(builder, args[0]))):
+        node = builder.zext(builder.load(builder.gep(first, [word(lane)])), word)
+        pointer = builder.bitcast(builder.gep(base, [builder.mul(node, word(4))]), four.as_pointer())
+        total = builder.fadd(builder.load(pointer, align=_bytes(padded)), row)
+        builder.store(total, pointer, align=_bytes(padded))
+    return context.get_dummy_value()
+
+
+def _interleaved(builder: Any, vectors: list[Any]) -> list[list[Any]]:
+    """(x, y) and (z, 0) of the even and of the odd lanes within each 128 bits, one instruction each."""
+    x, y, z = vectors
+    width, each = x.type.count, 128 // (64 if x.type.element == ir.DoubleType() else 32)
+    zero = ir.Constant(x.type, [0.0] * width)
+    half = each // 2
+    orders = [
+        [k + at + part * width for k in range(0, width, each) for at in range(begin, begin + half) for part in (0, 1)]
+        for begin in (0, half)
+    ]
+    return [[_shuffled(builder, a, b, order) for a, b in ((x, y), (z, zero))] for order in orders]
+
+
+def _rows_double(builder: Any, vectors: list[Any]) -> list[Any]:
+    """Rows (x, y, z, 0) of each lane."""
+    (even, none), (odd, other) = _interleaved(builder, vectors)
+    width, rows = vectors[0].type.count, []
+    for pair in range(0, width, 2):
+        for low, high in ((even, none), (odd, other)):
+            rows.append(_shuffled(builder, low, high, [pair, pair + 1, width + pair, width + pair + 1]))
+    return rows
+
+
+def _rows_single(builder: Any, vectors: list[Any]) -> list[Any]:
+    """The same in single precision: four rows are transposed within 128 bits."""
+    width, rows = vectors[0].type.count, []
+    wide = []
+    for low, high in _interleaved(builder, vectors):
+        for at in (0, 2):
+            order = [k + at + part * width + i for k in range(0, width, 4) for part in (0, 1) for i in (0, 1)]
+            wide.append(_shuffled(builder, low, high, order))
+    for lane in range(width):
+        begin = lane // 4 * 4
+        none = ir.Constant(wide[0].type, ir.Undefined)
+        rows.append(_shuffled(builder, wide[lane % 4], none, list(range(begin, begin + 4))))
+    return rows
 
 
 @_generates(root, lambda vector: vector, Vector)

@@ -11,8 +11,9 @@ BLOCK = 16
 NODES, POINTS, CORNERS = 10, 4, 4
 NEAR_SIZE = 8
 """Volumes of a cluster of the preconditioner: larger blocks have more numbers that do not count."""
+RIGIDITIES = 6
 ROWS, AREAS = 3 * NODES, 9
-"""Rows of an element: x, y, z of every node; rows of a point in `area`: x, y, z of three corners."""
+"""Rows of an element: x, y, z of every node; rows of a point in `area` and `corner_force`: x, y, z of three corners."""
 SUMS = ROWS + AREAS
 """Row of the first point's sum in the tile."""
 
@@ -100,34 +101,69 @@ class Inverse(NamedTuple):
 
 
 @by_address
-class PointRows(NamedTuple):
-    """m volumes over b blocks of quadratic tetrahedra: first v of the tissue, then those inside closed surfaces.
+class ElementRows(NamedTuple):
+    """b blocks of elements with the scratch of a pass over them, in one precision.
 
-    A row holds one number of each element of a block. Unused places repeat the first element; their results are
-    ignored.
+    A row holds one number of each element of a block. Unused places repeat the first element; they push nothing, and
+    their volumes are ignored.
     """
 
     node: np.ndarray
     """(10 b, BLOCK) uint32."""
-    per_weight: np.ndarray
-    """1/w_q [1/m³], (4 b, BLOCK)."""
+    used: np.ndarray
+    """1 for each element, 0 for an unused place, (b, BLOCK)."""
     own: float
     """ρ of the corner next to a point; `other` of each of the three others."""
     other: float
-    bulk: float
-    """b [Pa] of the pressure −b (J_q − 1) at points with the pressure of rest."""
-    rest_pressure: float
-    """[Pa]; above it b rises."""
     corner_volume: np.ndarray
     """The volume of each corner, (4 b, BLOCK) uint32."""
-    node_start: np.ndarray
-    """First entry of each node in `node_entry`, (n + 1,) uint32."""
-    node_entry: np.ndarray
-    """Flat index in `element_push` of each contribution to a node, uint32; y and z are BLOCK and 2 BLOCK further on."""
     volume_start: np.ndarray
     """First entry of each volume of the tissue in `volume_entry`, (v + 1,) uint32."""
     volume_entry: np.ndarray
     """Flat index in `corner_share` of each contribution to a volume, uint32."""
+    tile: np.ndarray
+    """Scratch: a vector at the nodes of a block, the common part of its slopes at the points, a sum for each point,
+    (43, BLOCK)."""
+    corner_pressure: np.ndarray
+    """Scratch: the pressure of each corner's volume [Pa], (4 b, BLOCK)."""
+    corner_share: np.ndarray
+    """Scratch: contributions of the elements to the volumes of their corners, (4 b, BLOCK)."""
+    corner_force: np.ndarray
+    """Scratch: what each point of a block does to three corners [N], (36, BLOCK)."""
+    push: np.ndarray
+    """Scratch: forces of the elements of a block on their nodes [N], (30, BLOCK)."""
+    force: np.ndarray
+    """Their sum at each node [N], (n, 4); the fourth number is 0."""
+
+
+@by_address
+class PointRows(NamedTuple):
+    """m volumes over b blocks of quadratic tetrahedra: first v of the tissue, then those inside closed surfaces."""
+
+    exact: ElementRows
+    """For positions, in the precision of the run."""
+    quick: ElementRows
+    """For the iteration of the multipliers, in single precision: each step measures the volumes anew, so that its
+    errors do not add up."""
+    area: np.ndarray
+    """w_q cof F_q ∇b_i of three corners [m²], (36 b, BLOCK) float32."""
+    velocity: np.ndarray
+    """Scratch: velocities or accelerations of the nodes [m/s, m/s²], (n, 4) float32; the fourth number is 0."""
+    rigidity: np.ndarray
+    """−mu w_q ∇b_i·∇b_j at rest of the pairs 11, 12, 13, 22, 23, 33 [N/m], (24 b, BLOCK); 0 if the springs of the body
+    are summed as springs."""
+    elastic: bool
+    """Whether all springs are in `rigidity`."""
+    per_weight: np.ndarray
+    """1/w_q [1/m³], (4 b, BLOCK)."""
+    bulk: float
+    """b [Pa] of the pressure −b (J_q − 1) at points with the pressure of rest."""
+    rest_pressure: float
+    """[Pa]; above it b rises."""
+    corner_eased: np.ndarray
+    """Scratch: `eased` of each corner's volume [Pa], (4 b, BLOCK)."""
+    most_squeezed: np.ndarray
+    """Largest 1 − J_q at a step of the frame so far, in each lane, (1, BLOCK)."""
     closed_triangles: np.ndarray
     """Closed surface whose volume is kept in addition to those of the tissue, (t, 3) uint32; empty for a solid body."""
     closed_nodes: np.ndarray
@@ -136,21 +172,6 @@ class PointRows(NamedTuple):
     """dV/dx of its volume [m²], (n, 3)."""
     heavier: np.ndarray
     """Gravitational mass less inertial mass of each node [kg], (n,)."""
-    area: np.ndarray
-    """Scratch: w_q cof F_q ∇b_i of three corners [m²], (36 b, BLOCK)."""
-    stretch: np.ndarray
-    """Scratch: −b_q (J_q − 1) [Pa], (4 b, BLOCK)."""
-    most_squeezed: np.ndarray
-    """Largest 1 − J_q at a step of the frame so far, in each lane, (1, BLOCK)."""
-    corner_pressure: np.ndarray
-    """Scratch: the pressure of each corner's volume [Pa], (4 b, BLOCK)."""
-    corner_share: np.ndarray
-    """Scratch: contributions of the elements to the volumes of their corners, (4 b, BLOCK)."""
-    element_push: np.ndarray
-    """Scratch: forces of the elements on their nodes [N], (30 b, BLOCK)."""
-    tile: np.ndarray
-    """Scratch: a vector at the nodes of a block, the common part of its slopes at the points, a sum for each point,
-    (43, BLOCK)."""
     volume: np.ndarray
     """V_r [m³], (m,)."""
     lam: np.ndarray
@@ -158,7 +179,7 @@ class PointRows(NamedTuple):
     eased: np.ndarray
     """The multipliers, followed slowly [Pa], (m,)."""
     push: np.ndarray
-    """The force on each node from all volumes and from the local pressure −b_q (J_q − 1) at the points [N], (n, 3)."""
+    """The force on each node from the change of the multipliers in this step [N], (n, 3)."""
     right: np.ndarray
     """Residual of the right-hand side with the current multipliers [m³/s²], (m,)."""
     diagonal: np.ndarray

@@ -9,7 +9,16 @@ import math
 
 from massspring.kernels.jit.decorators import njit_inlined, njit_lean
 from massspring.kernels.jit.vec3 import add_to, dot, minus, plus, put, row, times
-from massspring.kernels.points.facets import LEFT, add_at_point, at_point, begin_touch, force_at, forget, list_near
+from massspring.kernels.points.facets import (
+    LEFT,
+    at_point,
+    begin_touch,
+    force_at,
+    forget,
+    list_near,
+    name_speeds,
+    push_at_point,
+)
 
 SWEEPS = 40
 """Most sweeps per step. Under a plane all are used; 10 move the force by 2e-5 only, but a free ball then drifts."""
@@ -167,38 +176,33 @@ def sweep_until_settled(facets, boundary, step, speed, inverse_mass, count):
 
 
 @njit_lean
-def corrections_into(nodes, facets, boundary, step, speed, field, inverse_mass):
-    """The changes of the forces at all points, as nodal forces [N], into `field` (n, 3). Returns how many facets are
-    near an obstacle.
+def correct_forces(frame, rows, step, implicit):
+    """Solves for the forces at all points, and applies their changes. Returns how many facets are near an obstacle.
 
-    `speed` (n, 4): velocities of the nodes under the forces of the last step [m/s]; each correction updates it for the
-    following facets.
+    `node_vector` holds the velocities of their nodes; each correction updates it for the following facets.
     """
-    count, lost = list_near(facets, nodes, boundary, step, speed)
+    facets, boundary, speed, weights = rows.facets, frame.boundary, rows.node_vector, frame.model.inverse_mass
+    count, lost = list_near(frame, rows, step, implicit)
     if lost >= 0:
-        give_back(facets, speed, inverse_mass, boundary.dt, count)
-    sweep_until_settled(facets, boundary, step, speed, inverse_mass, count)
-    changes_into(facets, field, count)
-    return count
-
-
-@njit_inlined
-def changes_into(facets, field, count):
-    """Force less `last_force` at the points of the first `count` facets in `near`, as nodal forces [N] (n, 3)."""
-    field[:] = 0.0
+        give_back(facets, speed, weights, boundary.dt, count)
+    sweep_until_settled(facets, boundary, step, speed, weights, count)
     for k in range(count):
         f = facets.near[k]
         for q in range(facets.count[f]):
             change = minus(force_at(facets, f, q), row(facets.last_force[f], q))
-            add_at_point(facets, field, change, f, q)
+            push_at_point(frame, rows, implicit, change, f, q)
+    return count
 
 
 @njit_lean
-def book_points(facets, boundary, step, speed, contact_impulse, count):
+def book_points(frame, rows, step, implicit, count):
     """Adds the impulses on the points of the first `count` facets in `near` to their obstacles, and moves the anchors
-    of points that slide; `speed` (n, 4): velocities at the end of the step [m/s]."""
+    of points that slide, with the velocities at the end of the step."""
+    facets, impulse = rows.facets, frame.diagnostics.contact_impulse
     for k in range(count):
         f = facets.near[k]
+        if frame.boundary.rough:  # only a point that slides needs them
+            name_speeds(frame, rows, implicit, f)
         for q in range(facets.count[f]):
             if facets.contact_id[f, q] > 0:
-                book(facets, boundary, step, speed, contact_impulse, f, q)
+                book(facets, frame.boundary, step, rows.node_vector, impulse, f, q)

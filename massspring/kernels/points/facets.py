@@ -11,6 +11,7 @@ import math
 
 from massspring.kernels.contact.gaps import gap_and_normal
 from massspring.kernels.contact.nearest import box_square, nearest_of_facet, shape_at
+from massspring.kernels.contact.node_contact import after_contact
 from massspring.kernels.jit.decorators import njit_inlined, njit_lean
 from massspring.kernels.jit.vec3 import add_to, dot, minus, over, plus, put, row, times
 
@@ -188,17 +189,42 @@ def place_further_points(nodes, facets, boundary, step, inverse_mass):
                 facets.count[f] = q + 1
 
 
+@njit_inlined
+def push_at_point(frame, rows, implicit, force, f, q):
+    """A force (3,) [N] at point q of facet f: v* += dt W f of its nodes, and the force on those that are held. With
+    implicit springs into `field`, since each force moves all nodes."""
+    facets, nodes, weights, dt = rows.facets, frame.nodes, frame.model.inverse_mass, frame.boundary.dt
+    if implicit is not None:
+        add_at_point(facets, rows.field, force, f, q)
+        return
+    for a in range(6):
+        i, part = facets.node[f, a], times(facets.shape[f, q, a], force)
+        add_to(nodes.v_star, i, times(dt * weights[i], part))
+        add_to(nodes.force, i, part)
+
+
 @njit_lean
-def last_forces_into(nodes, facets, boundary, step, field):
-    """The contact forces of the last step at all points, along the current normals, as nodal forces [N] into `field`
-    (n, 3)."""
-    field[:] = 0.0
+def push_again(frame, rows, step, implicit):
+    """Applies the contact forces of the last step, along the current normals."""
+    facets, boundary = rows.facets, frame.boundary
     for f in range(facets.node.shape[0]):
         for q in range(facets.count[f]):
             if facets.contact_id[f, q] > 0:
-                y = at_point(nodes.x, facets.node, facets.shape[f, q], f)
+                y = at_point(frame.nodes.x, facets.node, facets.shape[f, q], f)
                 face(facets, boundary, step, y, facets.contact_id[f, q] - 1, (f, q))
-                add_at_point(facets, field, force_at(facets, f, q), f, q)
+                push_at_point(frame, rows, implicit, force_at(facets, f, q), f, q)
+
+
+@njit_inlined
+def name_speeds(frame, rows, implicit, f):
+    """ṽ + dt W̃ F [m/s] of the nodes of facet f, with the force F of `rows.push`, into `node_vector` (eq. 3.4, 3.5).
+    With implicit springs they are there for all nodes."""
+    if implicit is None:
+        nodes, dt = frame.nodes, frame.boundary.dt
+        for a in range(6):
+            i = rows.facets.node[f, a]
+            pushed = times(dt * frame.model.inverse_mass[i], row(rows.push, i))
+            put(rows.node_vector, i, after_contact(frame.contacts, i, plus(row(nodes.v_star, i), pushed)))
 
 
 @njit_inlined
@@ -228,10 +254,10 @@ def prepare_point(facets, boundary, step, state, f, q):
 
 
 @njit_inlined
-def list_near(facets, nodes, boundary, step, speed):
+def list_near(frame, rows, step, implicit):
     """Lists in `near`, and prepares, the facets that touch an obstacle or may touch one in this step. Returns their
     number, and the last facet that lost a contact, or −1."""
-    count, lost = 0, -1
+    facets, nodes, boundary, count, lost = rows.facets, frame.nodes, frame.boundary, 0, -1
     for f in range(facets.node.shape[0]):
         # A thin obstacle stretches a facet beyond its reach.
         near = facets.count[f] > facets.shape.shape[1] - FURTHER or not is_far(facets, nodes, boundary, step, f)
@@ -240,9 +266,10 @@ def list_near(facets, nodes, boundary, step, speed):
         if near:
             facets.near[count] = f
             count += 1
+            name_speeds(frame, rows, implicit, f)
             for q in range(facets.count[f]):
                 weights = facets.shape[f, q]
-                state = at_point(nodes.x, facets.node, weights, f), at_point(speed, facets.node, weights, f)
+                state = at_point(nodes.x, facets.node, weights, f), at_point(rows.node_vector, facets.node, weights, f)
                 if prepare_point(facets, boundary, step, state, f, q):
                     lost = f
     return count, lost

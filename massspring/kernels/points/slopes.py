@@ -8,7 +8,7 @@ with W_i = ∂x/∂b_i − ∂x/∂b_0, so w_q J_q = det W / 24 and w_q cof F_q 
 from massspring.kernels.jit.decorators import njit_inlined
 from massspring.kernels.jit.flat import flat
 from massspring.kernels.jit.vec3 import minus, plus, times
-from massspring.kernels.jit.vectors import gather, lanes_of, load, save, spread
+from massspring.kernels.jit.vectors import gather, lanes_of, load, save, scatter, spread
 from massspring.kernels.points.arrays import BLOCK, NODES, ROWS
 
 AT_0, AT_1, AT_2, AT_3 = (0, 4, 6, 7), (4, 1, 5, 8), (6, 5, 2, 9), (7, 8, 9, 3)
@@ -33,6 +33,14 @@ def gather_block(rows, vector, block):
             save(x, tile, at)
             save(y, tile, at + BLOCK)
             save(z, tile, at + 2 * BLOCK)
+
+
+@njit_inlined
+def scatter_block(rows, block):
+    """Adds the forces in `push` to the nodes of a block. The order does not depend on the size of a register."""
+    for a in range(NODES):
+        for lane in range(0, BLOCK, lanes_of(rows.push)):
+            scatter(load_three(rows.push, 3 * a, lane), rows.force, rows.node, NODES * block + a, lane)
 
 
 @njit_inlined

@@ -9,9 +9,9 @@ from massspring.kernels.constraint.schur import along, beyond, inner_product
 from massspring.kernels.contact.face_pairs import part_faces
 from massspring.kernels.contact.node_contact import after_contact, allowed
 from massspring.kernels.jit.decorators import compiled, njit_inlined, njit_lean
-from massspring.kernels.jit.flat import flat
+from massspring.kernels.jit.row_sums import copy_scaled
 from massspring.kernels.jit.vec3 import add_to, plus, put, row, times
-from massspring.kernels.points.elements import push_elements, push_of, times_into
+from massspring.kernels.points.elements import push_into, times_into
 from massspring.kernels.points.precondition import precondition_into
 
 
@@ -29,23 +29,39 @@ def weigh_into(model, nodes, rows, boundary):
             nodes.force[i, axis] += rows.heavier[i] * gravity[axis]
 
 
-@njit_inlined
-def respond(model, force, implicit, moved):
-    """W f [m/s²] into `moved` (n, 3): node by node, or with the inverse of the matrix of implicit springs."""
-    if implicit is None:
-        for i in range(force.shape[0]):
-            put(moved, i, times(model.inverse_mass[i], row(force, i)))
-    else:
-        respond_into(implicit.factor, force, moved)
-
-
 @njit_lean
-def pushed_velocity_into(model, nodes, contacts, rows, implicit, dt):
-    """u = ṽ + dt W̃ F [m/s] into `node_vector`, (n, 4), with the force F [N] of `rows.push` (eq. 3.4, 3.5)."""
-    u, moved = rows.node_vector, rows.moved
-    respond(model, rows.push, implicit, moved)
-    for i in range(moved.shape[0]):
-        put(u, i, after_contact(contacts, i, plus(row(nodes.v_star, i), times(dt, row(moved, i)))))
+def pushed_velocity_into(model, nodes, contacts, rows, implicit, dt, u):
+    """u = ṽ + dt W̃ F [m/s], (n, 4), with the force F [N] of `rows.push` (eq. 3.4, 3.5)."""
+    v_star, push, weights = nodes.v_star, rows.push, model.inverse_mass
+    if implicit is None:
+        for i in range(push.shape[0]):
+            put(u, i, plus(row(v_star, i), times(dt * weights[i], row(push, i))))
+    else:
+        respond_into(implicit.factor, push, rows.moved)
+        for i in range(push.shape[0]):
+            put(u, i, plus(row(v_star, i), times(dt, row(rows.moved, i))))
+    for k in range(contacts.active_count[0]):
+        i = contacts.active[k]
+        put(u, i, after_contact(contacts, i, row(u, i)))
+
+
+PRESSURE_LEFT = 0.01
+"""Error of a pressure that the iteration may leave, over the mean change of pressures since rest. What volumes leave
+becomes a force that grows as steps shorten, and shakes thin walls, whose pressures change little: with twice that much
+and more a coarse stomach gains energy."""
+LEAST_CHANGE = 1e-4
+"""Smallest change of pressures that counts, over that at rest: round-off is no load."""
+
+
+@njit_inlined
+def change_of_pressures(rows, rest_lam):
+    """Root mean square of lam_r − lam_r at rest [Pa] of the volumes that something can push."""
+    total, count = 0.0, 0
+    for r in range(rest_lam.shape[0]):
+        if rows.diagonal[r] > 0.0:
+            total += (rows.lam[r] - rest_lam[r]) ** 2
+            count += 1
+    return max(math.sqrt(total / max(count, 1)), LEAST_CHANGE * rows.rest_pressure)
 
 
 @njit_lean
@@ -55,11 +71,12 @@ def set_right_side(frame, rows, implicit, target, tolerance, pairs=None):
     Returns whether an error was capped, and whether a volume with an error had no gradient.
     """
     model, dt = frame.model, frame.boundary.dt
-    pushed_velocity_into(model, frame.nodes, frame.contacts, rows, implicit, dt)
-    part_faces(pairs, frame.contacts, model.inverse_mass, rows.node_vector, dt, True)
-    times_into(rows, rows.node_vector, rows.right)
+    pushed_velocity_into(model, frame.nodes, frame.contacts, rows, implicit, dt, rows.velocity)
+    part_faces(pairs, frame.contacts, model.inverse_mass, rows.velocity, dt, True)
+    times_into(rows, rows.velocity, rows.right)
     lightest, longest, per_second = model.largest_inverse_mass, model.correction_limit, 1.0 / dt
     limited, idle = False, False
+    left = PRESSURE_LEFT * change_of_pressures(rows, model.rest_lam)
     for r in range(target.shape[0]):
         error = target[r] - rows.volume[r]
         if not rows.diagonal[r] > 0.0:
@@ -69,7 +86,7 @@ def set_right_side(frame, rows, implicit, target, tolerance, pairs=None):
             limited |= part != error
             error = part
         rows.right[r] = (error * per_second - rows.right[r]) * per_second
-        rows.allowed[r] = tolerance * target[r] * per_second * per_second
+        rows.allowed[r] = min(tolerance * target[r] * per_second * per_second, left * rows.diagonal[r])
     return limited, idle
 
 
@@ -77,23 +94,29 @@ def set_right_side(frame, rows, implicit, target, tolerance, pairs=None):
 def apply_schur(frame, rows, implicit, p, product, pairs=None):
     """S p = J (W̃ (Jᵀ p)), (m,). Held nodes do not move, no node moves into an obstacle (eq. 3.4, 8.3), and touching
     faces of a cut do not move into each other (eq. 9.10)."""
-    push_elements(rows, p, False)
-    force, u, contacts = flat(rows.element_push, 0, rows.element_push.shape[0]), rows.node_vector, frame.contacts
-    field, moved = rows.field, rows.moved
-    for i in range(field.shape[0]):
-        put(field, i, push_of(rows, force, p, i))
-    respond(frame.model, field, implicit, moved)
-    for i in range(moved.shape[0]):
-        put(u, i, allowed(contacts, i, row(moved, i)))
-    part_faces(pairs, contacts, frame.model.inverse_mass, u, 1.0, False)
+    push_into(rows, p)
+    force, u, contacts, weights = rows.quick.force, rows.velocity, frame.contacts, frame.model.inverse_mass
+    if implicit is None:
+        for i in range(force.shape[0]):
+            copy_scaled(weights[i], force, i, u, i)
+    else:
+        for i in range(force.shape[0]):
+            put(rows.field, i, row(force, i))
+        respond_into(implicit.factor, rows.field, rows.moved)
+        for i in range(force.shape[0]):
+            put(u, i, row(rows.moved, i))
+    for k in range(contacts.active_count[0]):
+        i = contacts.active[k]
+        put(u, i, allowed(contacts, i, row(u, i)))
+    part_faces(pairs, contacts, weights, u, 1.0, False)
     times_into(rows, u, product)
 
 
 @njit_lean
 def add_response(model, nodes, rows, implicit, dt):
-    """v* += dt W f for the forces in `rows.field` [N], which are also added to the force on held nodes (eq. 3.1,
-    3.6)."""
-    respond(model, rows.field, implicit, rows.moved)
+    """v* += dt A⁻¹ f for the forces in `rows.field` [N], which are also added to the force on held nodes (eq. 3.6,
+    12.5)."""
+    respond_into(implicit.factor, rows.field, rows.moved)
     for i in range(rows.moved.shape[0]):
         add_to(nodes.v_star, i, times(dt, row(rows.moved, i)))
     for h in range(model.held_nodes.shape[0]):
@@ -126,7 +149,7 @@ def solve_iteratively(frame, rows, implicit, most, pairs=None):
         alpha = rho / curvature
         along(search, image, alpha, rows.lam, residual)
         for i in range(rows.push.shape[0]):
-            add_to(rows.push, i, times(alpha, row(rows.field, i)))
+            add_to(rows.push, i, times(alpha, row(rows.quick.force, i)))
         before = rho
         iteration += 1
     return iteration

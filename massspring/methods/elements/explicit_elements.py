@@ -27,8 +27,7 @@ from massspring.kernels.forces.elements import Elements
 from massspring.kernels.jit.decorators import njit_inlined, njit_lean
 from massspring.kernels.jit.stage_clock import VOLUME, end_stage
 from massspring.kernels.points.arrays import PointRows
-from massspring.kernels.points.elements import measure_into, push_into
-from massspring.kernels.points.solve import weigh_into
+from massspring.kernels.points.elements import measure_into
 from massspring.kernels.step.begin import begin_step, open_frame, search_contacts
 from massspring.kernels.step.end import end_step
 from massspring.layout.allocate import start
@@ -36,7 +35,7 @@ from massspring.layout.state import State
 from massspring.methods.capabilities import Capabilities, No
 from massspring.methods.elements.laws import LawName, supported, why_not_corotated
 from massspring.methods.elements.tangent import elements_of
-from massspring.methods.families.points import leave_points, meet_points
+from massspring.methods.families.points import begin_points, leave_points, meet_points
 from massspring.methods.families.pressure_law import check_modulus
 from massspring.methods.method import Method, begin_frame
 from massspring.world.obstacles import Attachment
@@ -82,13 +81,10 @@ def quadratic_elements_frame(frame, rows, bulk_modulus):
     push = Push(rows.push, 1.0)
     open_frame(frame)
     for step in range(boundary.position.shape[0]):
-        begin_step(frame, step, False)
-        weigh_into(model, nodes, rows, boundary)
         measure_into(rows, nodes.x, frame.work.padded_positions)
         target = boundary.volume_target[step]
         diagnostics.singular[0] += pressures_into(rows, rows.diagonal, model.rest_lam, bulk_modulus, target)
-        push_into(rows, rows.lam)
-        end_stage(diagnostics.stage_times, VOLUME)
+        begin_points(frame, step, rows)
         _, near = meet_points(frame, step, push, rows, None)
         leave_points(frame, step, rows, None, near)
         end_step(frame, step, push, 0.0, None)

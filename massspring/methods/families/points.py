@@ -11,9 +11,9 @@ from massspring.kernels.contact.face_pairs import press_pairs
 from massspring.kernels.jit.by_address import by_address
 from massspring.kernels.jit.decorators import njit_inlined, njit_lean
 from massspring.kernels.jit.stage_clock import HELD, INTEGRATION, SEARCH, SPRINGS, VOLUME, end_stage
-from massspring.kernels.points.elements import ease_into, measure_into, push_into
-from massspring.kernels.points.facet_forces import book_points, corrections_into
-from massspring.kernels.points.facets import last_forces_into, place_further_points
+from massspring.kernels.points.elements import ease_into, forces_into
+from massspring.kernels.points.facet_forces import book_points, correct_forces
+from massspring.kernels.points.facets import place_further_points, push_again
 from massspring.kernels.points.solve import (
     add_response,
     pushed_velocity_into,
@@ -21,7 +21,15 @@ from massspring.kernels.points.solve import (
     solve_iteratively,
     weigh_into,
 )
-from massspring.kernels.step.begin import begin_step, count_iterations, open_frame, search_contacts
+from massspring.kernels.step.begin import (
+    add_to_prediction,
+    begin_step,
+    count_iterations,
+    look_back,
+    open_frame,
+    prescribe_velocity_into,
+    search_contacts,
+)
 from massspring.kernels.step.end import add_held_impulse, advance, end_step
 from massspring.kernels.step.touching_faces import begin_pairs, contacts_stand, search_pairs
 
@@ -37,6 +45,45 @@ class SpringFactor(NamedTuple):
     """Held neighbours, (e,) uint32."""
     value: np.ndarray
     """dt² K_ih [kg], (e,)."""
+
+
+@njit_inlined
+def predict_elastic(model, nodes, rows, boundary):
+    """v* of eq. 3.1 from the force of all points and springs in `exact.force`, and gravity with the mass that `mass`
+    lacks; the same forces on held nodes."""
+    force, dt, gravity = rows.exact.force, boundary.dt, boundary.gravity
+    keep = 1.0 - boundary.damping * dt
+    for i in range(nodes.v.shape[0]):
+        w = dt * model.inverse_mass[i]
+        weight = dt + w * rows.heavier[i]
+        for axis in range(3):
+            nodes.v_star[i, axis] = keep * nodes.v[i, axis] + w * force[i, axis] + weight * gravity[axis]
+    for h in range(model.held_nodes.shape[0]):
+        i = model.held_nodes[h]
+        for axis in range(3):
+            nodes.force[i, axis] = force[i, axis] + rows.heavier[i] * gravity[axis]
+
+
+@njit_inlined
+def begin_points(frame, step, rows):
+    """`begin_step` with the forces of all points: the pressures `rows.lam` are in v*, so that `rows.push` begins at
+    0."""
+    model, nodes, boundary, diagnostics = frame.model, frame.nodes, frame.boundary, frame.diagnostics
+    if rows.elastic:
+        look_back(diagnostics, boundary, step)
+        forces_into(rows, nodes.x, frame.work.padded_positions, rows.lam)
+        predict_elastic(model, nodes, rows, boundary)
+        held = boundary.held_displacement[step]
+        prescribe_velocity_into(
+            nodes.x, model.held_nodes, model.held_group, model.held_rest, held, boundary.dt, nodes.v_star
+        )
+    else:
+        begin_step(frame, step, False)
+        weigh_into(model, nodes, rows, boundary)
+        forces_into(rows, nodes.x, frame.work.padded_positions, rows.lam)
+        add_to_prediction(model, nodes, rows.exact.force, boundary.dt)
+    rows.push[:] = 0.0
+    end_stage(diagnostics.stage_times, VOLUME)
 
 
 @njit_inlined
@@ -85,8 +132,11 @@ def meet_points(frame, step, push, rows, implicit):
     boundary, inside = frame.boundary, any_touches(frame.boundary, True)
     if inside:
         place_further_points(frame.nodes, rows.facets, boundary, step, frame.model.inverse_mass)
-        last_forces_into(frame.nodes, rows.facets, boundary, step, rows.field)
-        add_response(frame.model, frame.nodes, rows, implicit, boundary.dt)
+        if implicit is not None:
+            rows.field[:] = 0.0
+        push_again(frame, rows, step, implicit)
+        if implicit is not None:
+            add_response(frame.model, frame.nodes, rows, implicit, boundary.dt)
     passes = search_contacts(frame, step, push) if any_touches(boundary, False) else 1
     return passes, meet_facets(frame, step, rows, implicit) if inside else 0
 
@@ -94,10 +144,13 @@ def meet_points(frame, step, push, rows, implicit):
 @njit_inlined
 def meet_facets(frame, step, rows, implicit):
     """Contact inside facets with the pressures as they are. Returns how many facets are near an obstacle."""
-    boundary, model, nodes, speed = frame.boundary, frame.model, frame.nodes, rows.node_vector
-    pushed_velocity_into(model, nodes, frame.contacts, rows, implicit, boundary.dt)
-    near = corrections_into(nodes, rows.facets, boundary, step, speed, rows.field, model.inverse_mass)
-    add_response(model, nodes, rows, implicit, boundary.dt)
+    boundary, model, nodes = frame.boundary, frame.model, frame.nodes
+    if implicit is not None:
+        pushed_velocity_into(model, nodes, frame.contacts, rows, implicit, boundary.dt, rows.node_vector)
+        rows.field[:] = 0.0
+    near = correct_forces(frame, rows, step, implicit)
+    if implicit is not None:
+        add_response(model, nodes, rows, implicit, boundary.dt)
     end_stage(frame.diagnostics.stage_times, SEARCH)
     return near
 
@@ -106,10 +159,12 @@ def meet_facets(frame, step, rows, implicit):
 def leave_points(frame, step, rows, implicit, near):
     """Books contact inside facets with the velocities at the end of the step."""
     if near > 0:
-        boundary, model, nodes, speed = frame.boundary, frame.model, frame.nodes, rows.node_vector
-        if boundary.rough:  # only a point that slides needs them
-            pushed_velocity_into(model, nodes, frame.contacts, rows, implicit, boundary.dt)
-        book_points(rows.facets, boundary, step, speed, frame.diagnostics.contact_impulse, near)
+        if implicit is not None and frame.boundary.rough:
+            boundary = frame.boundary
+            pushed_velocity_into(
+                frame.model, frame.nodes, frame.contacts, rows, implicit, boundary.dt, rows.node_vector
+            )
+        book_points(frame, rows, step, implicit, near)
         end_stage(frame.diagnostics.stage_times, SEARCH)
 
 
@@ -138,15 +193,11 @@ def point_volumes_frame(frame, rows, implicit, accuracy, pairs):
     push = Push(rows.push, 1.0)
     open_frame(frame)
     for step in range(boundary.position.shape[0]):
-        begin_step(frame, step, False)
+        ease_into(rows)
+        begin_points(frame, step, rows)
         begin_pairs(frame, pairs, None)
-        weigh_into(model, nodes, rows, boundary)
         if implicit is not None:
             take_springs_implicitly(frame, rows, implicit)
-        ease_into(rows)
-        measure_into(rows, nodes.x, frame.work.padded_positions)
-        push_into(rows, rows.lam)
-        end_stage(diagnostics.stage_times, VOLUME)
         passes, near = meet_points(frame, step, push, rows, implicit)
         passes = search_pairs(frame, push, passes, pairs)
         limited, idle = keep_volumes(frame, step, rows, implicit, accuracy, push, passes, pairs)
