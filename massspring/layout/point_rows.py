@@ -39,7 +39,6 @@ def point_rows(body: Body, volumes: PointVolumes, inverse_mass: np.ndarray) -> P
         closed_nodes=np.unique(closed).astype(np.uint32),
         closed_gradient=np.zeros((n, 3)),
         heavier=body.mass - body.moved_mass,
-        push=aligned((n, 3), REAL),
         diagonal=diagonal,
         inverse=inverse,
         node_vector=aligned((n, 4), REAL),

@@ -178,8 +178,6 @@ class PointRows(NamedTuple):
     """Multipliers [Pa], (m,); on entry those of the last step."""
     eased: np.ndarray
     """The multipliers, followed slowly [Pa], (m,)."""
-    push: np.ndarray
-    """The force on each node from the change of the multipliers in this step [N], (n, 3)."""
     right: np.ndarray
     """Residual of the right-hand side with the current multipliers [m³/s²], (m,)."""
     diagonal: np.ndarray
@@ -193,7 +191,7 @@ class PointRows(NamedTuple):
     allowed: np.ndarray
     """Residual at which the iteration ends, (m,)."""
     node_vector: np.ndarray
-    """(n, 4); the fourth number is 0."""
+    """Scratch: velocities of the nodes of facets near an obstacle [m/s], (n, 4)."""
     field: np.ndarray
     """Scratch: forces on nodes [N], (n, 3)."""
     moved: np.ndarray

@@ -182,7 +182,7 @@ def correct_forces(frame, rows, step, implicit):
     `node_vector` holds the velocities of their nodes; each correction updates it for the following facets.
     """
     facets, boundary, speed, weights = rows.facets, frame.boundary, rows.node_vector, frame.model.inverse_mass
-    count, lost = list_near(frame, rows, step, implicit)
+    count, lost = list_near(frame, rows, step)
     if lost >= 0:
         give_back(facets, speed, weights, boundary.dt, count)
     sweep_until_settled(facets, boundary, step, speed, weights, count)
@@ -195,14 +195,14 @@ def correct_forces(frame, rows, step, implicit):
 
 
 @njit_lean
-def book_points(frame, rows, step, implicit, count):
+def book_points(frame, rows, step, count):
     """Adds the impulses on the points of the first `count` facets in `near` to their obstacles, and moves the anchors
     of points that slide, with the velocities at the end of the step."""
     facets, impulse = rows.facets, frame.diagnostics.contact_impulse
     for k in range(count):
         f = facets.near[k]
         if frame.boundary.rough:  # only a point that slides needs them
-            name_speeds(frame, rows, implicit, f)
+            name_speeds(frame, rows, f)
         for q in range(facets.count[f]):
             if facets.contact_id[f, q] > 0:
                 book(facets, frame.boundary, step, rows.node_vector, impulse, f, q)

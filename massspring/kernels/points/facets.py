@@ -216,15 +216,11 @@ def push_again(frame, rows, step, implicit):
 
 
 @njit_inlined
-def name_speeds(frame, rows, implicit, f):
-    """ṽ + dt W̃ F [m/s] of the nodes of facet f, with the force F of `rows.push`, into `node_vector` (eq. 3.4, 3.5).
-    With implicit springs they are there for all nodes."""
-    if implicit is None:
-        nodes, dt = frame.nodes, frame.boundary.dt
-        for a in range(6):
-            i = rows.facets.node[f, a]
-            pushed = times(dt * frame.model.inverse_mass[i], row(rows.push, i))
-            put(rows.node_vector, i, after_contact(frame.contacts, i, plus(row(nodes.v_star, i), pushed)))
+def name_speeds(frame, rows, f):
+    """ṽ [m/s] of the nodes of facet f into `node_vector` (eq. 3.4)."""
+    for a in range(6):
+        i = rows.facets.node[f, a]
+        put(rows.node_vector, i, after_contact(frame.contacts, i, row(frame.nodes.v_star, i)))
 
 
 @njit_inlined
@@ -254,7 +250,7 @@ def prepare_point(facets, boundary, step, state, f, q):
 
 
 @njit_inlined
-def list_near(frame, rows, step, implicit):
+def list_near(frame, rows, step):
     """Lists in `near`, and prepares, the facets that touch an obstacle or may touch one in this step. Returns their
     number, and the last facet that lost a contact, or −1."""
     facets, nodes, boundary, count, lost = rows.facets, frame.nodes, frame.boundary, 0, -1
@@ -266,7 +262,7 @@ def list_near(frame, rows, step, implicit):
         if near:
             facets.near[count] = f
             count += 1
-            name_speeds(frame, rows, implicit, f)
+            name_speeds(frame, rows, f)
             for q in range(facets.count[f]):
                 weights = facets.shape[f, q]
                 state = at_point(nodes.x, facets.node, weights, f), at_point(rows.node_vector, facets.node, weights, f)

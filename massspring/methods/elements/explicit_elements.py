@@ -78,7 +78,7 @@ def linear_elements_frame(frame, rows, bulk_modulus):
 def quadratic_elements_frame(frame, rows, bulk_modulus):
     """The same with the volumes of quadratic elements (eq. 8.8–8.12, 9.3–9.5)."""
     model, nodes, boundary, diagnostics = frame.model, frame.nodes, frame.boundary, frame.diagnostics
-    push = Push(rows.push, 1.0)
+    push = Push(nodes.gradient, 0.0)  # v* has the forces of all pressures
     open_frame(frame)
     for step in range(boundary.position.shape[0]):
         measure_into(rows, nodes.x, frame.work.padded_positions)
@@ -86,7 +86,7 @@ def quadratic_elements_frame(frame, rows, bulk_modulus):
         diagnostics.singular[0] += pressures_into(rows, rows.diagonal, model.rest_lam, bulk_modulus, target)
         begin_points(frame, step, rows)
         _, near = meet_points(frame, step, push, rows, None)
-        leave_points(frame, step, rows, None, near)
+        leave_points(frame, step, rows, near)
         end_step(frame, step, push, 0.0, None)
 
 
@@ -191,7 +191,7 @@ class ExplicitElements(Method):
     def _advance_corotated(self, after: State, memory: Corotated, boundary: BoundaryConditions) -> State:
         """One frame of corotated elements."""
         body, rows = memory.body, after.rows
-        assert rows is not None  # bodies with a single volume are refused
+        assert rows is not None and not isinstance(rows, PointRows)  # other bodies are refused
         corotated_elements_frame(after.frame(boundary), memory.elements, body.rest_volumes, rows.push)
         filling = boundary.volume_target[-1] / body.rest_volumes
         missing = filling - body.kept.measure(after.nodes.x) / body.rest_volumes

@@ -10,13 +10,12 @@ from massspring.kernels.constraint.ldl_solve import Triangular, respond_into
 from massspring.kernels.contact.face_pairs import press_pairs
 from massspring.kernels.jit.by_address import by_address
 from massspring.kernels.jit.decorators import njit_inlined, njit_lean
-from massspring.kernels.jit.stage_clock import HELD, INTEGRATION, SEARCH, SPRINGS, VOLUME, end_stage
+from massspring.kernels.jit.stage_clock import SEARCH, SPRINGS, VOLUME, end_stage
 from massspring.kernels.points.elements import ease_into, forces_into
 from massspring.kernels.points.facet_forces import book_points, correct_forces
 from massspring.kernels.points.facets import place_further_points, push_again
 from massspring.kernels.points.solve import (
     add_response,
-    pushed_velocity_into,
     set_right_side,
     solve_iteratively,
     weigh_into,
@@ -30,7 +29,7 @@ from massspring.kernels.step.begin import (
     prescribe_velocity_into,
     search_contacts,
 )
-from massspring.kernels.step.end import add_held_impulse, advance, end_step
+from massspring.kernels.step.end import end_step
 from massspring.kernels.step.touching_faces import begin_pairs, contacts_stand, search_pairs
 
 
@@ -66,8 +65,7 @@ def predict_elastic(model, nodes, rows, boundary):
 
 @njit_inlined
 def begin_points(frame, step, rows):
-    """`begin_step` with the forces of all points: the pressures `rows.lam` are in v*, so that `rows.push` begins at
-    0."""
+    """`begin_step` with the forces of all points under the pressures `rows.lam`."""
     model, nodes, boundary, diagnostics = frame.model, frame.nodes, frame.boundary, frame.diagnostics
     if rows.elastic:
         look_back(diagnostics, boundary, step)
@@ -82,7 +80,6 @@ def begin_points(frame, step, rows):
         weigh_into(model, nodes, rows, boundary)
         forces_into(rows, nodes.x, frame.work.padded_positions, rows.lam)
         add_to_prediction(model, nodes, rows.exact.force, boundary.dt)
-    rows.push[:] = 0.0
     end_stage(diagnostics.stage_times, VOLUME)
 
 
@@ -146,7 +143,6 @@ def meet_facets(frame, step, rows, implicit):
     """Contact inside facets with the pressures as they are. Returns how many facets are near an obstacle."""
     boundary, model, nodes = frame.boundary, frame.model, frame.nodes
     if implicit is not None:
-        pushed_velocity_into(model, nodes, frame.contacts, rows, implicit, boundary.dt, rows.node_vector)
         rows.field[:] = 0.0
     near = correct_forces(frame, rows, step, implicit)
     if implicit is not None:
@@ -156,15 +152,10 @@ def meet_facets(frame, step, rows, implicit):
 
 
 @njit_inlined
-def leave_points(frame, step, rows, implicit, near):
+def leave_points(frame, step, rows, near):
     """Books contact inside facets with the velocities at the end of the step."""
     if near > 0:
-        if implicit is not None and frame.boundary.rough:
-            boundary = frame.boundary
-            pushed_velocity_into(
-                frame.model, frame.nodes, frame.contacts, rows, implicit, boundary.dt, rows.node_vector
-            )
-        book_points(frame, rows, step, implicit, near)
+        book_points(frame, rows, step, near)
         end_stage(frame.diagnostics.stage_times, SEARCH)
 
 
@@ -174,7 +165,7 @@ def keep_volumes(frame, step, rows, implicit, accuracy, push, passes, pairs):
     Returns whether an error was capped, and whether a volume with an error had no gradient."""
     target, limited, idle = frame.boundary.volume_target[step], False, False
     for sweep in range(passes):
-        limited, idle = set_right_side(frame, rows, implicit, target, accuracy.tolerance, pairs)
+        limited, idle = set_right_side(frame, rows, target, accuracy.tolerance, pairs)
         count = solve_iteratively(frame, rows, implicit, accuracy.most_iterations, pairs)
         count_iterations(frame.diagnostics, count)
         if contacts_stand(frame, step, push, math.inf, sweep + 1 == passes, pairs):
@@ -190,7 +181,7 @@ def point_volumes_frame(frame, rows, implicit, accuracy, pairs):
     `implicit`: the factor of implicit springs, or None. `pairs`: faces of a cut that may touch, or None.
     """
     model, nodes, boundary, diagnostics = frame.model, frame.nodes, frame.boundary, frame.diagnostics
-    push = Push(rows.push, 1.0)
+    push = Push(nodes.gradient, 0.0)  # v* has the forces of all pressures
     open_frame(frame)
     for step in range(boundary.position.shape[0]):
         ease_into(rows)
@@ -204,25 +195,8 @@ def point_volumes_frame(frame, rows, implicit, accuracy, pairs):
         for _ in range(AGREEMENTS if near > 0 else 0):
             near = meet_facets(frame, step, rows, implicit)
             limited, idle = keep_volumes(frame, step, rows, implicit, accuracy, push, passes, pairs)
-        leave_points(frame, step, rows, implicit, near)
+        leave_points(frame, step, rows, near)
         diagnostics.limited[0] += limited
         diagnostics.singular[0] += idle
         press_pairs(pairs, model, nodes, frame.contacts, push, boundary.dt)
-        if implicit is None:
-            end_step(frame, step, push, 0.0, None)
-        else:
-            end_implicitly(frame, rows, implicit)
-
-
-@njit_inlined
-def end_implicitly(frame, rows, implicit):
-    """v⁺ = v* + dt A⁻¹ F and x⁺ (eq. 3.5, 12.5); adds the impulses of attachments."""
-    model, nodes, boundary, diagnostics = frame.model, frame.nodes, frame.boundary, frame.diagnostics
-    add_held_impulse(model, nodes, Push(rows.push, 1.0), boundary.dt, boundary.gravity, diagnostics.held_impulse)
-    end_stage(diagnostics.stage_times, HELD)
-    respond_into(implicit.factor, rows.push, rows.moved)
-    for i in range(rows.moved.shape[0]):
-        for axis in range(3):
-            nodes.v_star[i, axis] += boundary.dt * rows.moved[i, axis]
-    advance(frame, Push(rows.push, 0.0))
-    end_stage(diagnostics.stage_times, INTEGRATION)
+        end_step(frame, step, push, 0.0, None)
