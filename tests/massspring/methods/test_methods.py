@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from massspring import Body, Clock, ImplicitVolume, Method, Plane, Setup, Trajectory, simulate, step_limit
+from massspring.body.points import PointVolumes
 from massspring.kernels.arrays.layout import Push
 from massspring.kernels.constraint.one_volume import volume_multiplier
 from massspring.kernels.step.begin import begin_step, open_frame, search_contacts
@@ -18,6 +19,7 @@ from tests.massspring.conftest import body_of
 from tests.massspring.rows import CONTESTANTS, rows
 
 MOMENTUM_TOL = 1e-12  # relative: round-off of some thousand additions per step, over 40 steps
+SINGLE_TOL = 1e-9  # of changes of pressures over points, which are in single precision
 
 
 def clock_for(body: Body, frames: int, steps: int, fraction: float = 0.5, method: Method | None = None) -> Clock:
@@ -71,10 +73,11 @@ def test_free_flight_keeps_momentum_and_spin(kept_body, method):
     state = method.advance(state, setup.boundary(0))
     after = momentum(kept_body.mass, state.x, state.v)
     scale = np.abs(kept_body.mass[:, None] * v).sum()
-    assert np.abs(after[0] - before[0]).max() < MOMENTUM_TOL * scale
+    close = SINGLE_TOL if isinstance(kept_body.kept, PointVolumes) else MOMENTUM_TOL
+    assert np.abs(after[0] - before[0]).max() < close * scale
     gained = np.abs(after[1] - before[1]).max() / (scale * kept_body.size)
     # What does not claim it loses a hundred times more than round-off, or it should claim it.
-    assert gained < MOMENTUM_TOL if method.conserves_angular_momentum else 100 * MOMENTUM_TOL < gained < 1e-2
+    assert gained < close if method.conserves_angular_momentum else 100 * MOMENTUM_TOL < gained < 1e-2
 
 
 def test_a_fall_is_a_parabola(kept_body, method):
