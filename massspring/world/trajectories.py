@@ -38,7 +38,8 @@ class Trajectory:
 
     @cached_property
     def _alone(self) -> "Paths":
-        return Paths((self,))
+        # A path of its own type that asks for this one must not be asked in turn.
+        return Paths((Trajectory(self.times, self.displacements),))
 
 
 STILL = Trajectory()
@@ -52,11 +53,14 @@ class Paths:
         self.times = np.array([t for path in paths for t in path.times], dtype=np.float64)
         keys = [key for path in paths for key in path.displacements]
         self.keys = np.array(keys, dtype=np.float64).reshape(-1, 3)
+        self.other = [(k, path) for k, path in enumerate(paths) if type(path).__call__ is not Trajectory.__call__]
 
     def __call__(self, t: np.ndarray) -> np.ndarray:
         """Displacements [m] at times `t` (q,) [s], (q, o, 3)."""
         out = np.empty((len(t), len(self.first) - 1, 3))
         displacements_into(t, self.first, self.times, self.keys, out)
+        for k, path in self.other:  # of a type of its own
+            out[:, k] = path(t)
         return out
 
 

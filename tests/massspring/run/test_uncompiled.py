@@ -110,5 +110,7 @@ def test_no_index_leaves_its_array_and_the_answer_is_the_compiled_one(name, plai
     assert plain[name]["counts"] == fast["counts"] and (fast["counts"][CARRIED] > 0) == (name == "probed")
     assert np.abs(fast["contact_force"]).max() > 0
     for key in ("final", "pressure", "contact_force"):
-        # Compiled code contracts products and sums, twenty steps and an active set long.
-        assert np.allclose(plain[name][key], fast[key], rtol=0, atol=1e-9 * np.abs(fast[key]).max()), key
+        # Compiled code contracts products and sums, twenty steps and an active set long; changes of the pressures over
+        # points are in single precision.
+        close = (1e-7 if name == "facets" else 1e-9) * np.abs(fast[key]).max()
+        assert np.allclose(plain[name][key], fast[key], rtol=0, atol=close), key
