@@ -13,6 +13,7 @@ from studies.base.doing import HEARING
 from studies.base.processes import Tell, run_each
 from studies.catalog.study import Study
 from studies.geometry.mesher.jobs import cache_folder
+from studies.geometry.mesher.shipped import OWN
 from studies.runs.user_code import Given, given_files, load_given
 from studies.store.ledger import Ledger
 from studies.sweep.executor import CompileListener, Progress
@@ -41,7 +42,7 @@ def environment() -> dict[str, str]:
     variables = {**dict.fromkeys(ONE_THREAD, "1"), "ORGANBENCH_CACHE": str(cache_folder().absolute())}
     if os.environ.get(COMPILED):
         variables[COMPILED] = str(Path(os.environ[COMPILED]).absolute())
-    return variables
+    return variables | ({OWN: os.environ[OWN]} if OWN in os.environ else {})
 
 
 @dataclass(frozen=True)

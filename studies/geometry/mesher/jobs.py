@@ -21,6 +21,7 @@ from massspring.sources import source_fingerprint
 from studies.base.errors import StudyError
 from studies.geometry.mesh.organ_mesh import OrganMesh
 from studies.geometry.mesher.process import STOPPED, followed
+from studies.geometry.mesher.shipped import shipped
 from studies.geometry.shape.regions import held_nodes, region_from_dict
 
 TIME_LIMIT = 300.0
@@ -45,11 +46,12 @@ MAKERS = ("studies.geometry.mesher.organ_recipe", *dict.fromkeys(MADE_ELSEWHERE.
 def mesh_from(
     recipe: dict[str, Any], arrays: dict[str, np.ndarray] | None = None, limit: float = TIME_LIMIT
 ) -> OrganMesh:
-    """The mesh of a JSON-able recipe and the arrays that it needs, cached; limit: processor time [s]. Raises StudyError
-    if it cannot be made or stored, and for a region without nodes."""
+    """The mesh of a JSON-able recipe and the arrays that it needs, shipped or cached; limit: processor time [s]. Raises
+    StudyError if it cannot be made or stored, and for a region without nodes."""
     given, cuts = arrays or {}, cuts_of(recipe)
+    ready = None if given else shipped(recipe)
     parts = (*PARTS, *(("losses",) if recipe["kind"] == "scan" else ()), *cuts)
-    made = cached(recipe, given, parts, lambda: run_worker(recipe, given | surface_of(recipe), limit))
+    made = ready or cached(recipe, given, parts, lambda: run_worker(recipe, given | surface_of(recipe), limit))
     mesh = OrganMesh(
         recipe["name"],
         made["points"],
@@ -69,7 +71,7 @@ def surface_of(recipe: dict[str, Any]) -> dict[str, np.ndarray]:
     if recipe["kind"] != "organ" or not recipe["fill"] or cuts_of(recipe):
         return {}
     alone = {key: value for key, value in recipe.items() if key != "layers"} | {"fill": False}
-    surface = stored_in(cache_path(alone, {}), PARTS)
+    surface = shipped(alone) or stored_in(cache_path(alone, {}), PARTS)
     return {} if surface is None else {part: surface[part] for part in ("points", "triangles")}
 
 

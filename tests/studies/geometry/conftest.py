@@ -1,8 +1,11 @@
 """Meshes shared by the geometry tests, made from nothing in every run."""
 
+from collections.abc import Iterator
+
 import pytest
 
 from studies.geometry import HalfSpace, ball, liver
+from studies.geometry.mesher.shipped import OWN
 
 RADIUS = 0.05
 CAP = 0.035
@@ -14,6 +17,14 @@ CAPS = {
 COUNTS = (150, 300, 550)
 
 
+@pytest.fixture(autouse=True)
+def own_meshes() -> Iterator[None]:
+    """These tests are of the code that makes meshes: none is a shipped one."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv(OWN, "1")
+        yield
+
+
 @pytest.fixture(scope="session")
 def balls(mesh_cache):
     """Balls with two caps by node count."""
@@ -22,8 +33,10 @@ def balls(mesh_cache):
 
 @pytest.fixture(scope="session")
 def livers(mesh_cache):
-    """Livers with their bare area by node count."""
-    return {nodes: liver(nodes) for nodes in COUNTS}
+    """Livers with their bare area by node count, made."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv(OWN, "1")
+        return {nodes: liver(nodes) for nodes in COUNTS}
 
 
 @pytest.fixture(scope="session")
