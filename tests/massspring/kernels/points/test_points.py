@@ -82,6 +82,18 @@ def test_springs_summed_as_springs_move_the_body_alike():
     close(runs[1].held_force, runs[0].held_force, 1e-6)
 
 
+def test_what_is_held_takes_the_momentum_that_the_body_loses():
+    """Free nodes gain the impulses of the attachments and of gravity, those of the multipliers' changes among them."""
+    body = quadratic_body(*curved_block((3, 3, 1)), SOFT)
+    setup = replace(pulled(body), damping=0.0, clock=Clock(0.02 / 100, 1, 1))
+    before = setup.start()
+    after = setup.method.advance(before, setup.boundary(0))
+    free = before.model.inverse_mass > 0.0
+    gained = (before.model.mass[:, None] * (after.v - before.v))[free].sum(axis=0)
+    weight = setup.clock.duration * before.model.mass.sum() * np.asarray(setup.gravity)
+    close(after.diagnostics.held_impulse.sum(axis=0), gained - weight, SINGLE)
+
+
 def pulled(body: Body) -> Setup:
     """A heavy body held at one end and pulled at the other."""
     low, high = (np.flatnonzero(body.rest[:, 0] == end) for end in (body.rest[:, 0].min(), body.rest[:, 0].max()))
