@@ -49,17 +49,18 @@ class Paths:
     """Several trajectories that compiled code evaluates together, since a run does so in every frame."""
 
     def __init__(self, paths: Sequence[Trajectory]) -> None:
-        self.first = np.cumsum([0, *(len(path.times) for path in paths)])
-        self.times = np.array([t for path in paths for t in path.times], dtype=np.float64)
-        keys = [key for path in paths for key in path.displacements]
+        plain = [path if type(path).__call__ is Trajectory.__call__ else STILL for path in paths]
+        self.first = np.cumsum([0, *(len(path.times) for path in plain)])
+        self.times = np.array([t for path in plain for t in path.times], dtype=np.float64)
+        keys = [key for path in plain for key in path.displacements]
         self.keys = np.array(keys, dtype=np.float64).reshape(-1, 3)
-        self.other = [(k, path) for k, path in enumerate(paths) if type(path).__call__ is not Trajectory.__call__]
+        self.other = [(k, path) for k, path in enumerate(paths) if path is not plain[k]]
 
     def __call__(self, t: np.ndarray) -> np.ndarray:
         """Displacements [m] at times `t` (q,) [s], (q, o, 3)."""
         out = np.empty((len(t), len(self.first) - 1, 3))
         displacements_into(t, self.first, self.times, self.keys, out)
-        for k, path in self.other:  # of a type of its own
+        for k, path in self.other:  # a function, or of a type of its own
             out[:, k] = path(t)
         return out
 

@@ -21,7 +21,8 @@ from massspring.kernels.points.facets import (
 )
 
 SWEEPS = 40
-"""Most sweeps per step. Under a plane all are used; 10 move the force by 2e-5 only, but a free ball then drifts."""
+"""Most sweeps per step. Under a plane inside facets, as with semi_implicit, all are used; 10 move the force by 2e-5
+only, but a free ball then drifts."""
 RELAXATION = 1.5
 """Factor on each correction (successive over-relaxation); it takes a quarter fewer sweeps than 1."""
 NEARLY = 1.0 - 1e-9

@@ -24,3 +24,17 @@ def test_paths_interpolate_as_numpy_does(keys):
     ]
     np.testing.assert_array_equal(Paths(paths)(times), np.stack(wanted, axis=1))
     np.testing.assert_array_equal(paths[0](float(times[7])), wanted[0][7])
+
+
+def test_functions_and_types_of_their_own_are_followed_beside_paths():
+    class Shaken(Trajectory):
+        def __call__(self, t):
+            return super().__call__(t) + np.sin(np.asarray(t))[..., None]
+
+    def away(t):
+        return np.stack([t, 2.0 * t, 0.0 * t], axis=-1)
+
+    straight = drawn(np.random.default_rng(0), 3)
+    shaken, times = Shaken(straight.times, straight.displacements), np.linspace(-0.2, 1.2, 20)
+    wanted = np.stack([straight(times), straight(times) + np.sin(times)[:, None], away(times)], axis=1)
+    np.testing.assert_array_equal(Paths([straight, shaken, away])(times), wanted)
