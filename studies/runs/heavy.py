@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from massspring import Attachment, Body, Trajectory
+from massspring import Attachment, Body, Ramp, Trajectory
 from massspring.analysis.stability import slowest_frequency
 from studies.runs.indicators import still_from
 from studies.scene.inertia import SLOW, top_speed, velocities, why_not_heavier
@@ -58,17 +58,19 @@ class Heaviness:
         return body if self.factor == 1.0 else replace(body, inertia=self.factor * body.moved_mass)
 
 
-def heaviness(scene: Scene, body: Body, attachments: tuple[Attachment, ...]) -> Heaviness:
+def heaviness(scene: Scene, body: Body, attachments: tuple[Attachment, ...], lumen: float = 0.0) -> Heaviness:
     """The largest that the scene allows a body with masses by stiffness, in which only equilibria matter
-    (studies.scene.inertia). Raises MassSpringError."""
+    (studies.scene.inertia), with a lumen of that volume [m³]. Raises MassSpringError."""
     reason = why_not_heavier(scene)
     if reason is not None:
         return Heaviness(1.0, reason, scene.damping)
     omega = slowest_frequency(body, np.concatenate([held.nodes for held in attachments]))
     moving = [mover.path for mover in (*scene.obstacles, *scene.held)]
+    moving += [wall_path(scene.lumen.filling, lumen)] if scene.lumen is not None else []
     speed = max(map(top_speed, moving))
     wave = math.sqrt(scene.tissue.shear_modulus / scene.tissue.density)
-    gaps = [float(obstacle.gap(body.rest, 0.0).min()) for obstacle in scene.obstacles] + [0.0] * len(scene.held)
+    gaps = [float(obstacle.gap(body.rest, 0.0).min()) for obstacle in scene.obstacles]
+    gaps += [0.0] * (len(moving) - len(gaps))
     jolt = max(kink(path, max(gap, 0.0)) for path, gap in zip(moving, gaps, strict=True))
     alone, since = any(scene.gravity), still_from(scene)
     judged = (scene.checkpoints[0] if alone else scene.checkpoints[-1]) if scene.checkpoints else scene.duration
@@ -83,6 +85,12 @@ def heaviness(scene: Scene, body: Body, attachments: tuple[Attachment, ...]) -> 
     if root <= 1.0:
         return Heaviness(1.0, limit, scene.damping)
     return Heaviness(root**2, limit, scene.damping / root**2, (since, CALM * omega / root))
+
+
+def wall_path(filling: Ramp, volume: float) -> Trajectory:
+    """Mean way of the wall of a lumen of that volume at rest [m³] while it is filled: that of a ball's radius."""
+    radius = np.cbrt(0.75 * volume / math.pi * np.asarray(filling.values))
+    return Trajectory(filling.times, tuple((r - radius[0], 0.0, 0.0) for r in radius))
 
 
 def kink(path: Trajectory, gap: float = 0.0) -> float:

@@ -170,7 +170,7 @@ def volumes_for(scene: Scene, recipe: BodyRecipe, mesh: OrganMesh, body: Body) -
 
 def targets_for(scene: Scene, mesh: OrganMesh, body: Body) -> dict[str, Ramp]:
     """Targets of the kept volumes when the lumen is filled."""
-    if scene.lumen is None or set(scene.lumen.filling.values) == {1.0}:
+    if scene.lumen is None or not scene.lumen.changes:
         return {}
     filling = scene.lumen.filling
     if LUMEN in body.kept.names:
@@ -235,7 +235,7 @@ def prepared_on(case: Case, mesh: OrganMesh | QuadraticMesh) -> Prepared:
         mesh = mesh.outer()
     attachments, frames = attachments_for(scene, mesh), frames_between(scene, case.frames or scene.frames)
     events, opening, limit_before, tissue = (), None, None, None
-    heavy = heaviness(scene, body, attachments) if case.body.mass == "heavy" else None
+    heavy = heaviness(scene, body, attachments, mesh.lumen_volume) if case.body.mass == "heavy" else None
     inert = heavy or Heaviness(damping=scene.damping)
     last = body = inert.of(body)
     if heavy is not None and heavy.factor == 1.0:

@@ -36,14 +36,13 @@ def why_inertia_matters(scene: Scene) -> str | None:
 
 def why_not_heavier(scene: Scene) -> str | None:
     """Why a body may not be heavier than its tissue in a slow scene, as far as the scene alone tells."""
-    movers = [mover for mover in (*scene.obstacles, *scene.held) if top_speed(mover.path) > 0.0]
+    fills = scene.lumen is not None and scene.lumen.changes
+    moves = fills or any(top_speed(mover.path) > 0.0 for mover in (*scene.obstacles, *scene.held))
     if not scene.held:
         return "nothing holds it"
     if scene.cuts:
         return "a cut lets it swing"
-    if scene.lumen is not None and set(scene.lumen.filling.values) != {1.0}:
-        return "its lumen is filled"
-    if any(scene.gravity) and movers:
+    if any(scene.gravity) and moves:
         return "its weight lets it swing while loads move"
     return None
 

@@ -53,7 +53,7 @@ def load_of(scene: Scene) -> str:
     moving = [obstacle for obstacle in scene.obstacles if top_speed(obstacle.path) > 0]
     if any(isinstance(obstacle, Sphere | Capsule) for obstacle in moving):
         return "probe"
-    if scene.lumen is not None and set(scene.lumen.filling.values) != {1.0}:
+    if scene.lumen is not None and scene.lumen.changes:
         return "fill"
     planes = [obstacle for obstacle in moving if isinstance(obstacle, Plane)]
     if any(top_speed(held.path) > 0 for held in scene.held) or len(planes) > 1 or (planes and not scene.held):

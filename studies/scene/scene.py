@@ -61,8 +61,13 @@ class Lumen:
     def __post_init__(self) -> None:
         if self.content not in ("closed", "open"):
             raise StudyError(f"a lumen's content is 'closed' or 'open', not '{self.content}'")
-        if self.content == "open" and set(self.filling.values) != {1.0}:
+        if self.content == "open" and self.changes:
             raise StudyError("an open lumen cannot be filled; close it, or leave its filling out")
+
+    @property
+    def changes(self) -> bool:
+        """Whether its content grows or shrinks."""
+        return set(self.filling.values) != {1.0}
 
 
 @dataclass(frozen=True)

@@ -1,12 +1,12 @@
 """Bodies as heavy as their scene allows: by which rule, and that what their loads end in stays."""
 
 from dataclasses import replace
-from math import sqrt
+from math import pi, sqrt
 
 import numpy as np
 import pytest
 
-from massspring import Trajectory
+from massspring import Ramp, Trajectory
 from massspring.analysis.stability import slowest_frequency
 from studies.runs.case import Case
 from studies.runs.heavy import CALM, ENDS, ENDS_ALONE, KINK, MOST, heaviness, kink
@@ -16,12 +16,15 @@ from studies.runs.run import measure
 from studies.scene.inertia import SLOW
 from studies.scene.library.ball_clamped import BALL_CLAMPED
 from studies.scene.library.ball_squeeze import BALL_SQUEEZE
+from studies.scene.scene import Lumen
 from studies.store.record import Status
 
 SCENE = replace(BALL_CLAMPED, reference=None, checkpoints=(1.5, 4.0))
 BOTTOM, TOP = SCENE.held
 SAG = replace(SCENE, held=(BOTTOM,), gravity=(0.0, 0.0, -1.0), checkpoints=(4.0,), quantities=("surface",))
 HEAVY, LIGHT = QuadraticBody(234, mass="heavy"), QuadraticBody(234, mass="stiffness")
+RADIUS = 0.5
+"""Of a ball as large as the lumen that is filled [m]."""
 WAVE = sqrt(SCENE.tissue.shear_modulus / SCENE.tissue.density)
 
 
@@ -29,6 +32,11 @@ def pushed(rise: float, way: float = 0.0125) -> dict:
     """The held regions of a ball pushed down by `way` [m] over `rise` [s]."""
     path = Trajectory((0.0, rise), ((0.0, 0.0, 0.0), (0.0, 0.0, -way)))
     return {"held": (BOTTOM, replace(TOP, path=path))}
+
+
+def filled(rise: float, growth: float):
+    """The ball held below, with a lumen whose radius grows by that factor over `rise` [s]."""
+    return replace(SCENE, held=(BOTTOM,), lumen=Lumen(filling=Ramp((0.0, rise), (1.0, growth**3))))
 
 
 @pytest.fixture(scope="module")
@@ -43,6 +51,8 @@ def mesh(mesh_cache):
         ("shear waves", SCENE, lambda omega: SLOW * WAVE / (0.0125 / 3.0)),
         ("changes its speed", replace(SCENE, **pushed(1.0, 1e-4)), lambda omega: KINK * omega),
         ("must end", replace(SCENE, **pushed(3.5, 1e-4)), lambda omega: 0.5 * CALM * omega * 0.5 / ENDS),
+        ("changes its speed", filled(2.5, 1.001), lambda omega: KINK * omega * 2.5),
+        ("shear waves", filled(2.5, 1.05), lambda omega: SLOW * WAVE / (0.05 * RADIUS / 2.5)),
         ("must end", replace(SAG, checkpoints=(1.0, 4.0)), lambda omega: 0.5 * CALM * omega / ENDS_ALONE),
     ],
 )
@@ -50,7 +60,7 @@ def test_a_body_is_as_heavy_as_the_slowest_of_its_limits_allows(mesh, limit, sce
     """The frequency is proved in test_stability; damping at rest follows it, and while loads move the drag stays."""
     body, attachments = body_for(scene, LIGHT, mesh), attachments_for(scene, mesh)
     omega = slowest_frequency(body, np.concatenate([held.nodes for held in attachments]))
-    found = heaviness(scene, body, attachments)
+    found = heaviness(scene, body, attachments, 4.0 / 3.0 * pi * RADIUS**3)
     assert limit in found.limit and found.factor == pytest.approx(root(omega) ** 2, rel=1e-9) and found.factor > 1.5
     assert found.damping * found.factor == pytest.approx(scene.damping, rel=1e-12) and found.at_rest is not None
     assert found.at_rest[1] == pytest.approx(CALM * omega / root(omega), rel=1e-9)
