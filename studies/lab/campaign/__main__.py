@@ -5,7 +5,11 @@ What was interrupted continues. Exit code 1: a body is silent and far off.
 
 import argparse
 import json
+import math
+import multiprocessing
 import os
+import resource
+import signal
 import subprocess
 import sys
 import time
@@ -19,7 +23,7 @@ import numpy as np
 from studies import StudyError
 from studies.catalog.accuracy import BUDGETS, FINEST
 from studies.lab.campaign.draw import MOST, member
-from studies.lab.campaign.outcome import Outcome, outcomes
+from studies.lab.campaign.outcome import Outcome, judge, told
 
 CELLS = [f"{told}, {truth}" for told in ("silent", "doubted") for truth in ("right", "wrong", "far", "undecided")]
 FINE, WORST_FIRST = ("silent, right", "doubted, right", "not ok", "refused"), [*CELLS, "crashed"]
@@ -27,16 +31,52 @@ MOST_DOUBTED = 0.15
 """Largest share of the right bodies that may be doubted."""
 
 
-def result_of(root: Path, seed: int, number: int, scans: list[Path], most: float) -> dict[str, Any]:
-    """What a member gives, as JSON; most: unknowns of its reference. Raises StudyError for one that has no scene."""
-    scene, started = member(seed, number, scans), time.process_time()
+def run_member(path: Path, seed: int, number: int, scans: list[Path], most: float, seconds: float) -> None:
+    """Runs a member in a process of its own, with at most so many seconds of processor time, and stores what it gives;
+    nothing for one that has no scene. most: unknowns of its reference."""
+    part = path.with_suffix(".part")
+    given = part, seed, number, scans, most, seconds
+    one = multiprocessing.get_context("fork").Process(target=_run, args=given)
+    one.start()
+    one.join()
+    if one.exitcode != 0:
+        ended = f"its process ended with {one.exitcode}"
+        row = json.loads(part.read_text(encoding="utf-8")) if part.is_file() else _row(number, "", [])
+        out_of_time = one.exitcode == -signal.SIGXCPU
+        _store(part, row | {"fault": f"stopped after {seconds:g} s" if out_of_time else ended, "stopped": True})
+    if part.is_file():
+        os.replace(part, path)
+
+
+def _run(part: Path, seed: int, number: int, scans: list[Path], most: float, seconds: float) -> None:
+    """Bodies are stored before their reference is solved."""
+    resource.setrlimit(resource.RLIMIT_CPU, (math.ceil(seconds), resource.RLIM_INFINITY))
+    part.unlink(missing_ok=True)
+    try:
+        scene = member(seed, number, scans)
+    except StudyError as error:
+        print(f"member {number} is skipped: {error}", flush=True)
+        return
     assert scene.reference is not None  # a member has a plan
     scene = replace(scene, reference=replace(scene.reference, most=most))
     print(f"{number}: {scene.title}", flush=True)
     nodes = int(np.random.default_rng([seed, number, 1]).choice([*BUDGETS, FINEST]))
-    bodies, fault = outcomes(root, scene, nodes)
-    row = {"member": number, "commit": commit(), "title": scene.title, "fault": fault}
-    return row | {"seconds": time.process_time() - started, "bodies": [asdict(one) for one in bodies]}
+    _store(part, _row(number, scene.title, []))
+    ended = told(part.parent, scene, nodes)
+    _store(part, _row(number, scene.title, [one for one, _ in ended]))
+    fault = judge(part.parent, scene, ended)
+    _store(part, _row(number, scene.title, [one for one, _ in ended]) | {"fault": fault})
+
+
+def _row(number: int, title: str, bodies: list[Outcome]) -> dict[str, Any]:
+    row = {"member": number, "commit": commit(), "title": title, "fault": "", "stopped": False}
+    return row | {"seconds": time.process_time(), "bodies": [asdict(one) for one in bodies]}
+
+
+def _store(path: Path, row: dict[str, Any]) -> None:
+    new = path.with_suffix(".new")
+    new.write_text(json.dumps(row, indent=1) + "\n", encoding="utf-8")
+    os.replace(new, path)
 
 
 def commit() -> str:
@@ -57,6 +97,9 @@ def table_of(rows: list[dict[str, Any]], again: str) -> tuple[str, int]:
     far, doubted, right = counts["silent, far"], counts["doubted, right"], counts["silent, right"]
     lines.append(f"\nsilent and more than 3 targets off: {far} (allowed: 0)")
     lines.append(f"right but doubted: {doubted} of {doubted + right} (allowed: {100 * MOST_DOUBTED:.0f} %)")
+    stopped = [row for row in rows if row["stopped"]]
+    lines.append(f"members that did not end: {len(stopped)} of {len(rows)}")
+    lines += [f"  {row['member']}: {row['title']}; {row['fault']}" for row in stopped]
     lines.append(f"commits: {', '.join(sorted({row['commit'] for row in rows}))}")
     odd = [(row, one) for row, one in bodies if one.kind not in FINE]
     for row, one in sorted(odd, key=lambda pair: WORST_FIRST.index(pair[1].kind)):
@@ -73,6 +116,7 @@ def main(words: list[str]) -> int:
     parser.add_argument("--results", type=Path, default=Path("results"), metavar="DIR")
     parser.add_argument("--scans", type=Path, metavar="FOLDER", help="surfaces, PLY in mm; default: none, skipped")
     parser.add_argument("--most", type=float, default=MOST, metavar="N", help="unknowns of references")
+    parser.add_argument("--seconds", type=float, default=900.0, metavar="S", help="processor time of a member")
     parser.add_argument("--member", type=int, metavar="N", help="this one alone, again")
     given = parser.parse_args(words)
     scans = sorted(given.scans.glob("*.ply")) if given.scans else []
@@ -83,16 +127,9 @@ def main(words: list[str]) -> int:
         path = root / f"{number:04d}.json"
         if given.member is None and path.is_file():
             continue
-        try:
-            text = json.dumps(result_of(root, given.seed, number, scans, given.most), indent=1) + "\n"
-        except StudyError as error:
-            print(f"member {number} is skipped: {error}")
-            continue
-        part = path.with_suffix(".part")
-        part.write_text(text, encoding="utf-8")
-        os.replace(part, path)
+        run_member(path, given.seed, number, scans, given.most, given.seconds)
     rows = [json.loads(path.read_text(encoding="utf-8")) for path in sorted(root.glob("*.json"))]
-    options = f"--seed {given.seed} --results {given.results} --most {given.most:g}"
+    options = f"--seed {given.seed} --results {given.results} --most {given.most:g} --seconds {given.seconds:g}"
     options += f" --scans {given.scans}" if given.scans else ""
     text, far = table_of(rows, f"{parser.prog} {options} --member")
     print(text)

@@ -23,10 +23,12 @@ from studies.catalog.accuracy import LONG, even
 from studies.catalog.of_scene import study_of
 from studies.metrics.judged import DISPLACEMENT, FORCE
 from studies.metrics.metrics import few_facets
-from studies.metrics.trust import verdicts
+from studies.metrics.trust import apart, verdicts
 from studies.metrics.wish import usual_wish
+from studies.runs.current import case_path
 from studies.runs.indicators import remarks
 from studies.scene.checks import check_scene
+from studies.store.record import write_record
 
 JUDGED, UNIFORM, ADVISED = "run FILE.py", "uniform", "advised"
 """Ways to a body: the finer of the two meshes of `organbench run FILE.py`, which the coarser one judges; uniform with a
@@ -71,45 +73,54 @@ class Outcome:
         return "right" if all(value <= target for value, _, target in known) else "wrong"
 
 
-def outcomes(root: Path, scene: Scene, nodes: int) -> tuple[list[Outcome], str]:
-    """Every way through a scene, and what is wrong with its reference, which is solved below `root` if a body is ok.
+Ended = list[tuple[Outcome, Run | None]]
+
+
+def told(root: Path, scene: Scene, nodes: int) -> Ended:
+    """What every way through a scene gives, with the run if it is ok; records are stored below `root`.
 
     nodes: of the uniform body.
     """
     alone, ran = replace(scene, reference=None), dict[str, Record]()  # as a user has it
+
+    def ended_of(way: str, chosen: Callable[[], Case]) -> tuple[Outcome, Run | None]:
+        return _ended(root, way, chosen, alone, ran)
+
     ended = [
-        _ended(JUDGED, lambda: study_of(alone).cases[-1], alone, ran),
-        _ended(UNIFORM, lambda: _case(alone, replace(even(alone)[0], nodes=nodes), LONG), alone, ran),
-        _ended(ADVISED, lambda: _case(alone, *recommended(alone)), alone, ran),
+        ended_of(JUDGED, lambda: study_of(alone).cases[-1]),
+        ended_of(UNIFORM, lambda: _case(alone, replace(even(alone)[0], nodes=nodes), LONG)),
+        ended_of(ADVISED, lambda: _case(alone, *recommended(alone))),
     ]
-    fine = ended[0][1]
+    one, fine = ended[0]
     if fine is not None:
-        other, coarse = _ended(JUDGED, lambda: study_of(alone).cases[-2], alone, ran)
+        other, coarse = ended_of(JUDGED, lambda: study_of(alone).cases[-2])
         if coarse is None:
-            ended[0][0].doubts.append(f"the coarser mesh is {other.status}: {other.message}")
+            one.doubts.append(f"the coarser mesh is {other.status}: {other.message}")
         else:
-            ended[0][0].doubts += [one.why for one in verdicts([coarse, fine]) if not one.trusted]
-    runs = [(one, run) for one, run in ended if run is not None]
-    try:
-        return [one for one, _ in ended], _judge(root, scene, runs) if runs else ""
-    except StudyError as error:
-        return [one for one, _ in ended], str(error)
+            one.doubts += [verdict.why for verdict in verdicts([coarse, fine]) if not verdict.trusted]
+            one.signs |= {f"apart_{name}": value for name, value in apart(coarse, fine)._asdict().items()}
+    return ended
 
 
 def _case(scene: Scene, body: BodyRecipe, dt_fraction: float) -> Case:
     return Case(scene, body, ImplicitVolume(), dt_fraction=dt_fraction)
 
 
-def _ended(way: str, chosen: Callable[[], Case], scene: Scene, ran: dict[str, Record]) -> tuple[Outcome, Run | None]:
+def _ended(
+    root: Path, way: str, chosen: Callable[[], Case], scene: Scene, ran: dict[str, Record]
+) -> tuple[Outcome, Run | None]:
     """What is told of a case, and its run if it is ok; ran: records of the scene by recipe, which do not run again."""
     try:
         odd, case = check_scene(scene), chosen()
         recipe = f"{case.body!r}, dt_fraction={case.dt_fraction:g}"
-        record = ran[recipe] = ran.get(recipe) or measure(case)
+        record = ran.get(recipe) or measure(case)
     except StudyError as error:
         return Outcome(way, "", "refused", str(error)), None
     except Exception as error:  # a program that breaks is a finding, not the end of the campaign
         return Outcome(way, "", "crashed", f"{type(error).__name__}: {error}"), None
+    if recipe not in ran:
+        ran[recipe] = record
+        write_record(case_path(root, scene.name, case), record)
     early = record.status in (Status.FAILED, Status.SKIPPED)  # refused before the first step
     one = Outcome(way, recipe, "refused" if early else str(record.status), record.message)
     if record.status != Status.OK:
@@ -124,9 +135,15 @@ def _ended(way: str, chosen: Callable[[], Case], scene: Scene, ran: dict[str, Re
     return one, run
 
 
-def _judge(root: Path, scene: Scene, runs: list[tuple[Outcome, Run]]) -> str:
-    """Compares runs with the reference; returns its warning. Raises StudyError where it cannot be solved."""
-    reference, wish = solve_reference(root, scene), usual_wish(scene)
+def judge(root: Path, scene: Scene, ended: Ended) -> str:
+    """Compares runs with the reference, solved below `root` if a body is ok; returns what is wrong with it."""
+    runs, wish = [(one, run) for one, run in ended if run is not None], usual_wish(scene)
+    if not runs:
+        return ""
+    try:
+        reference = solve_reference(root, scene)
+    except StudyError as error:
+        return str(error)
     for one, run in runs:
         judged = replace(run, case=replace(run.case, scene=scene), reference=reference)
         for entry, target in ((FORCE, wish.force), (DISPLACEMENT, wish.displacement)):
