@@ -1,6 +1,8 @@
 """The campaign: a member is the same whatever was drawn before, what a user is told is counted as that, and what was
 interrupted continues."""
 
+import os
+import signal
 from dataclasses import replace
 
 import numpy as np
@@ -76,7 +78,7 @@ def test_truth(force, mean, truth):
         (ZeroDivisionError("0"), {}, "crashed"),
     ],
 )
-def test_what_a_user_is_told(told, signs, answer, monkeypatch):
+def test_what_a_user_is_told(told, signs, answer, tmp_path, monkeypatch):
     def measured(case):
         if isinstance(told, Exception):
             raise told
@@ -86,25 +88,41 @@ def test_what_a_user_is_told(told, signs, answer, monkeypatch):
 
     monkeypatch.setattr(outcome, "measure", measured)
     monkeypatch.setattr(outcome, "check_scene", lambda scene: [])
-    one = outcome._ended("", lambda: run().case, SCENE, {})[0]
+    one = outcome._ended(tmp_path, "", lambda: run().case, SCENE, {})[0]
     assert one.kind.split(",")[0] == answer, one.message
 
 
-def test_what_was_interrupted_continues_and_a_silent_body_that_is_far_off_fails(tmp_path, monkeypatch, capsys):
+def test_what_was_interrupted_continues_and_a_silent_body_that_is_far_off_fails(tmp_path, monkeypatch, capfd):
     """Members 0, 1, 6 and 8 to 12 of seed 7 are of scans: they are skipped, and drawn again when there are some."""
-    asked, far = [], {"force": (90.0, 0.1, 3.0)}
 
-    def outcomes(root, scene, nodes):
-        asked.append(scene.name)
-        return [Outcome("uniform", "recipe", "ok", errors=far if len(asked) == 2 else {"force": FORCE})], ""
+    def told(root, scene, nodes):
+        far = scene.name.endswith("0003")
+        return [(Outcome("uniform", "recipe", "ok", errors={"force": (90.0, 0.1, 3.0) if far else FORCE}), None)]
 
-    monkeypatch.setattr(command, "outcomes", outcomes)
+    monkeypatch.setattr(command, "told", told)
     line = ["--seed", "7", "--results", str(tmp_path), "--scenes"]
-    assert [command.main([*line, count]) for count in ("3", "4", "4")] == [0, 1, 1] and len(asked) == 2
-    text = capsys.readouterr().out
+    assert [command.main([*line, count]) for count in ("3", "4", "4")] == [0, 1, 1]
+    text = capfd.readouterr().out
     assert (
         "more than 3 targets off: 1 (" in text
-        and f"--results {tmp_path} --most 60000 --member 3\n" in text
+        and f"--results {tmp_path} --most 60000 --seconds 900 --member 3\n" in text
         and text.count("member 1 is skipped: its organ is a scan") == 3
+        and [text.count(f"{number}: ") for number in (2, 3)] == [1, 1]
     )
-    assert command.main([*line, "2", "--member", "3"]) == 0 and len(asked) == 3
+    assert command.main([*line, "2", "--member", "3"]) == 1 and "\n3: " in capfd.readouterr().out
+
+
+def test_a_member_that_takes_too_long_or_crashes_is_named_with_what_it_had_found(tmp_path, monkeypatch, capfd):
+    def judge(root, scene, ended):
+        while scene.name.endswith("0002"):
+            pass
+        os.kill(os.getpid(), signal.SIGKILL)
+
+    monkeypatch.setattr(command, "told", lambda *_: [(Outcome("uniform", "recipe", "ok"), None)])
+    monkeypatch.setattr(command, "judge", judge)
+    line = ["--seed", "7", "--results", str(tmp_path), "--scenes", "4", "--seconds", "1"]
+    assert command.main(line) == command.main(line) == 0
+    lines = capfd.readouterr().out.splitlines()
+    assert lines.count("members that did not end: 2 of 2") == 2 and "| all | 0 | 0 | 0 | 2 |" in "\n".join(lines)
+    assert [line[-17:] for line in lines if line.startswith("  2: ")] == ["stopped after 1 s"] * 2
+    assert [line[-25:] for line in lines if line.startswith("  3: ")] == ["its process ended with -9"] * 2
