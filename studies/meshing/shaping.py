@@ -13,13 +13,14 @@ from studies.geometry import CurvedMesh, OrganMesh, curved
 from studies.geometry.mesh.organ_mesh import tetrahedron_volumes, turn_inverted
 from studies.geometry.mesh.quality import PAIRS, tetrahedron_radius_ratio
 from studies.geometry.shape.levelset import Shape, at_depth, project
+from studies.meshing.bounds import SHAPE
 from studies.meshing.held_mesh import HeldMesh, rim_sides
 from studies.meshing.quadratic_mesh import TURNED, QuadraticMesh, uprightness
 from studies.meshing.retreat import Measure, retreat
 from studies.meshing.true_shape import as_curved, in_cut_planes, on_true_shape, true_shape
 from studies.scene.scene import Scene
 
-OFF = 1e-3
+OFF = 0.01 * SHAPE
 """Distance of a node from its target, over the size of the body, beyond which there is a warning."""
 
 

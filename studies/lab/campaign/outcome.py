@@ -128,7 +128,7 @@ def _ended(
     run = Run(case, record)
     one.signs = {name: value for name, value in record.attributes.items() if isinstance(value, int | float)}
     warnings = str(record.attributes["warnings"])
-    for sentence in remarks(one.signs):
+    for sentence in remarks(scene, one.signs):
         warnings = warnings.replace(sentence, "") if any(part in sentence for part in ELSEWHERE) else warnings
     one.doubts = [words for words in (*odd, warnings.strip("; "), "few facets" * few_facets(run)) if words]
     one.signs |= {entry.name: value for entry in METRICS if math.isfinite(value := entry(run))}

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from massspring import (
+    Attachment,
     Clock,
     History,
     ImplicitVolume,
@@ -20,6 +21,7 @@ from massspring import (
     simulate,
     tetrahedral_body,
 )
+from studies.geometry.mesh.organ_mesh import tetrahedron_volumes
 from studies.runs.indicators import (
     FEEDS,
     SHAKES,
@@ -37,11 +39,13 @@ from studies.runs.indicators import (
     unlike_neighbours,
     unsettled,
 )
+from studies.runs.outlines import missed_at_outlines
 from studies.runs.run import measure
 from studies.runs.status import shaking
 from studies.scene.library.ball_clamped import BALL_CLAMPED
+from studies.scene.library.spleen_sag import SPLEEN_SAG
 from tests.massspring.conftest import SOFT, block
-from tests.massspring.quadratic import quadratic_block
+from tests.massspring.quadratic import bricks, quadratic_block
 from tests.studies.tiny import SQUEEZE, tiny_case
 
 GOOD = {
@@ -56,6 +60,7 @@ GOOD = {
     "unbalanced": 1e-3,
     "unsettled": 1e-3,
     "shortened": 1.5,
+    "missed_at_outlines": 0.02,
 }
 
 
@@ -174,9 +179,9 @@ def test_a_checkerboard_counts_and_a_gradient_does_not():
     [
         ({"unknowns_per_volume": 0.6}, "locks"),
         ({"alternation": 0.6}, "alternate"),
-        ({"sway": 2 * SWAYS}, "oscillates by 2 % at the end while nothing outside moves; give the scene more"),
-        ({"sway": 2 * SWAYS, "gained": 2 * FEEDS}, "oscillates by 2 % at the end while nothing outside moves; halve"),
-        ({"sway": 2 * SWAYS, "heaviness": 4.0}, "oscillates by 2 % at the end while nothing outside moves; take mass="),
+        ({"sway": 2 * SWAYS}, "oscillates by 4 % at the end while nothing outside moves; give the scene more"),
+        ({"sway": 2 * SWAYS, "gained": 2 * FEEDS}, "oscillates by 4 % at the end while nothing outside moves; halve"),
+        ({"sway": 2 * SWAYS, "heaviness": 4.0}, "oscillates by 4 % at the end while nothing outside moves; take mass="),
         ({"swing": 2 * SWINGS}, "swings by 2 %"),
         ({"unsettled": 2 * SWINGS}, "creeps, 2 % from where it will rest; give the scene more"),
         ({"unsettled": 0.005, "heaviness": 4.0}, "creeps, 0.5 % from where it will rest; take mass="),
@@ -189,9 +194,32 @@ def test_a_checkerboard_counts_and_a_gradient_does_not():
     ],
 )
 def test_each_indicator_has_a_remark_beyond_its_bound(changed, word):
-    assert remarks(GOOD) == [] and remarks(dict.fromkeys(GOOD, np.nan)) == []
-    (remark,) = remarks(GOOD | changed)
+    assert remarks(SQUEEZE, GOOD) == [] and remarks(SQUEEZE, dict.fromkeys(GOOD, np.nan)) == []
+    (remark,) = remarks(SQUEEZE, GOOD | changed)
     assert word in remark
+
+
+def test_what_is_missed_at_outlines_is_bounded_by_the_target_of_what_is_compared():
+    """Of kidneys 594 nodes missed 17 and 7.4 % of the force of a pull (0.08 and 0.095), 1,594 nodes 1.8 % (0.018); of
+    the displacement of one that hangs 1.4 % (0.015)."""
+    for missed, told in ((0.08, True), (0.095, True), (0.018, False)):
+        assert bool(remarks(BALL_CLAMPED, GOOD | {"missed_at_outlines": missed})) == told
+    for scene in (SPLEEN_SAG, replace(BALL_CLAMPED, gravity=(0.0, 0.0, -9.81))):
+        (hanging,) = remarks(scene, GOOD | {"missed_at_outlines": 0.015})
+        assert "the displacement may be about 1.5 % off" in hanging
+
+
+def test_what_is_missed_at_outlines_is_the_energy_there_over_the_root_of_the_facets():
+    """In an even stretch each element has energy like its volume. A held face of 2 × 2 squares has eight facets."""
+    body = quadratic_body(*bricks((2, 2, 2), (0.04, 0.04, 0.04)), SOFT)
+    low, end = body.rest.min(axis=0), body.rest.max(axis=0)
+    held = Attachment(np.flatnonzero(body.rest[:, 2] == low[2]))
+    on = (body.rest[:, 2] == low[2]) & ((body.rest == low) | (body.rest == end))[:, :2].any(axis=1)
+    volumes = tetrahedron_volumes(body.rest, body.tetrahedra)
+    share = volumes[on[body.tetrahedra].any(axis=1)].sum() / volumes.sum()
+    missed = missed_at_outlines(body, (held, held), body.rest * np.array([0.8, 1.25, 1.0]))
+    assert 0.1 < share < 0.9 and missed == pytest.approx(2.0 * share / 8**0.5)
+    assert np.isnan(missed_at_outlines(body, (), body.rest))
 
 
 @pytest.mark.parametrize(("weight", "share"), [(0.0, 0.2), (0.1, 0.1), (0.4, 0.4)])
@@ -259,7 +287,7 @@ def test_a_body_that_turns_is_too_large_by_the_square_of_its_angle_in_a_step(ome
         made = simulate(Setup(body, method, Clock(4 * dt, 20, 4), velocity=spin))
         off = indicators(SQUEEZE, body, made, -1, True, 4)["volume_off"]
         assert off == pytest.approx(expected, rel=0.1, abs=1e-12)
-        assert bool(remarks(GOOD | {"volume_off": off})) == (expected > 1e-4)
+        assert bool(remarks(SQUEEZE, GOOD | {"volume_off": off})) == (expected > 1e-4)
     assert np.isnan(indicators(SQUEEZE, body, made, -1, False, 4)["volume_off"])
 
 
