@@ -20,8 +20,8 @@ OCTANT, OCTANT_ORDER = 176.5, 2.14
 STEP = {"surface": 0.40, "membrane": 0.40, "tetrahedral": 0.30, "quadratic": 0.23}
 """Stability limit over size √(rho/mu) / √n of a body with n surface nodes: medians of results/published, as are all
 numbers from here on (426 cases; the organ's size is the diagonal of its box)."""
-STEP_BY_STIFFNESS, HOLLOW_STEP, GRADED_STEP = 1.8, 0.6, 0.7
-"""Factors on the limit: masses by stiffness, a wall, elements that are halved."""
+BY_MASS, HOLLOW_STEP, GRADED_STEP = {"lumped": 1.0, "stiffness": 1.8, "heavy": 5.0}, 0.6, 0.7
+"""Factors on the limit: masses, a wall, elements that are halved."""
 MICROSECONDS = {"surface": 0.04, "membrane": 0.04, "tetrahedral": 0.06, "quadratic": 0.7}
 """Of a step, per surface node, with one volume or with one per vertex of a quadratic body."""
 BY_VOLUMES = {"nodal": 0.5, "patches": 0.5, "regions": 0.13}
@@ -86,7 +86,7 @@ def run_seconds(case: Case) -> float:
     scene, body = case.scene, case.body
     wave = math.sqrt(scene.tissue.shear_modulus * body.stiffness / scene.tissue.density)
     limit = STEP[body.kind] * organ_size(scene) / math.sqrt(body.nodes) / wave
-    limit *= 1.0 if body.mass == "lumped" else STEP_BY_STIFFNESS
+    limit *= BY_MASS[body.mass]
     limit *= HOLLOW_STEP if scene.lumen is not None and body.kind != "surface" else 1.0
     limit *= GRADED_STEP if body.graded else 1.0
     dt = case.dt_fraction * limit if case.dt == "auto" else float(case.dt)

@@ -45,6 +45,14 @@ def test_only_members_of_that_organ_with_that_recipe_count(tmp_path, place):
     assert "41 other organs" in words(summary) and "1 more failed" in words(summary) and "3.8 %" in words(summary)
 
 
+def test_of_a_heavy_body_the_lighter_one_is_told_as_that(no_tables, tmp_path):
+    light, heavy = (replace(CASE, body=replace(CASE.body, mass=mass)) for mass in ("stiffness", "heavy"))
+    table(tmp_path / "population" / "population.csv", light)
+    assert unseen(tmp_path, heavy).force == unseen(tmp_path, light).force
+    assert "(liver, masses by stiffness, 1 more failed)" in words(unseen(tmp_path, heavy))
+    assert "masses" not in words(unseen(tmp_path, light))
+
+
 def test_without_runs_on_the_population_there_is_no_summary(no_tables, tmp_path):
     assert unseen(tmp_path, CASE) is None
     table(tmp_path / "population" / "population.csv")
