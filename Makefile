@@ -42,6 +42,7 @@ publish: setup-verify compiled ## all that is published, again, by this machine 
 	$(BIN)/python -m studies.lab.verify
 	$(BIN)/organbench report --figures
 	$(BIN)/python -m studies.lab.silicone
+	$(BIN)/python -m studies.lab.silicone cylinder_press
 	$(MAKE) fuzz
 	$(BIN)/python -m studies.lab.league --sweep
 	$(BIN)/python -m studies.lab.league

@@ -75,6 +75,16 @@ def floor(column: str) -> str:
     return column.replace(" [", " floor [")
 
 
+def tabled(name: str) -> list[str]:
+    return [f"{name} at {c} %" for c in (30, 40, 50)]
+
+
+def pressed(*bodies: str) -> float:
+    """Largest error of their forces from 4 to 40 % compression [%]."""
+    table = rows("silicone", "press_curves").query("0.039 < compression < 0.401")
+    return max(100.0 * (table[f"body, {name}"] / table["reference"] - 1.0).abs().max() for name in bodies)
+
+
 def of(table: pd.DataFrame, **settings: object) -> pd.DataFrame:
     """The rows with these settings; a list allows several."""
     for name, value in settings.items():
@@ -292,6 +302,7 @@ def warned() -> list[float]:
 
 
 README, FINDINGS, LIMITS, PAPER = "README.md", "docs/findings.md", "docs/limits.md", "docs/paper.md"
+SILICONE = "docs/silicone.md"
 PEOPLE, BREAKING, CUTTING = "docs/population.md", "docs/breaking.md", "docs/cutting.md"
 OPENED = (("ball_incised", 794), ("ball_incised", 994), ("liver_incised", 994), ("shell_opened", 994),
           ("stomach_opened", 1194))  # fmt: skip
@@ -400,9 +411,28 @@ ROWS = [
     opened("rest shape / size", "# %", DISTANCE),
     ("docs/league.md", "needs # to # s for", lambda: span(of(rows("league"), engine="ours-quadratic")["cost [s/s]"])),
     ("docs/league.md", "PyBullet by at most # percentage points and those of Drake by #.", halved_steps),
-    *(("docs/silicone.md", f"| {who}{NU.get(who, '')} | #, #, # | #, #, # | #, #, # |",
+    *((SILICONE, f"| {who}{NU.get(who, '')} | #, #, # | #, #, # | #, #, # |",
         lambda who=who: of(rows("silicone"), who=who).iloc[:, 2:].to_numpy().ravel().tolist())
       for who in rows("silicone")["who"].unique()),
+    *((SILICONE, f"| {name} | # | #, #, # | #, #, # | #, #, # | # | #, #, # |", lambda name=name: [
+        of(rows("silicone", "press"), material=name)[column].item() for column in (
+            "mu", *tabled("scatter"), *tabled("B"), *tabled("B by mu of A"), "b", *tabled("B with b"))])
+      for name in rows("silicone", "press")["material"]),
+    *((SILICONE, f"| {law} | {scope} | # | #, # | #, # | #, # | # |", lambda n=n:
+        rows("silicone", "press_laws").iloc[n, 2:-1].tolist())
+      for n, (law, scope) in enumerate(rows("silicone", "press_laws").fillna("–").iloc[:, :2].to_numpy())),
+    *((SILICONE, f"| {shape:.2f} | #, #, #, # | # |",
+        lambda n=n: rows("silicone", "press_modulus").iloc[n, 1:].tolist())
+      for n, shape in enumerate(rows("silicone", "press_modulus").iloc[:, 0])),
+    (SILICONE, "nodes are at most # % off from 4 to 40 % compression, mixed ones # %", lambda: (
+        pressed("a volume per vertex", "a volume per vertex, finer mesh"), pressed("mixed volumes"))),
+    (LIMITS, "with volumes of vertices are within # % from 4 to 40 %", lambda: (pressed("a volume per vertex"),)),
+    (SILICONE, "fitted between 5 and 20 %, it is # times",
+        lambda: (rows("silicone", "press")["mu if plates slide"].median(),)),
+    (SILICONE, "within 2 % at 30 % for # of 15 materials", lambda: ((
+        rows("silicone", "press")[["A at 30 %", "B at 30 %"]].mean(axis=1).abs() < 2.0).sum(),)),
+    (LIMITS, "its force is up to # % off at 30 % and # % at 50 %", lambda: [
+        rows("silicone", "press")[f"B at {c} %"].abs().max() for c in (30, 50)]),
     (CUTTING, "| paper's surface body, 350 surface nodes | – | #, #, # |",
         lambda: cutting("surface", 350, "kidney_bisected", FORCE, MEAN, OPENING)),
     *((CUTTING, f"| {words}, {nodes} | #, #, # | #, #, # |", lambda body=body, nodes=nodes: [

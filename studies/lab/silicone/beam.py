@@ -61,20 +61,28 @@ class Beam:
     @cached_property
     def corners(self) -> tuple[np.ndarray, np.ndarray]:
         """Points (n, 3) [m] and tetrahedra (k, 4), positive."""
-        points, cells = self.mesh.p.T.copy(), self.mesh.t.T.astype(np.int64)
-        a, b, c, d = points[cells].transpose(1, 0, 2)
-        wrong = np.einsum("ki,ki->k", np.cross(b - a, c - a), d - a) < 0.0
-        cells[wrong] = cells[wrong][:, [0, 2, 1, 3]]
-        return points, cells
+        return upright(self.mesh.p.T.copy(), self.mesh.t.T.astype(np.int64))
 
     @cached_property
     def quadratic(self) -> tuple[np.ndarray, np.ndarray]:
         """Points with those in the middle of edges (n, 3) [m], and cells (k, 10) in VTK's order."""
-        points, cells = self.corners
-        ends = np.sort(cells[:, EDGES].reshape(-1, 2), axis=1)
-        edges, which = np.unique(ends, axis=0, return_inverse=True)
-        middles = len(points) + which.reshape(-1, len(EDGES))
-        return np.concatenate([points, points[edges].mean(axis=1)]), np.concatenate([cells, middles], axis=1)
+        return second_order(*self.corners)
+
+
+def upright(points: np.ndarray, cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Points (n, 3) and tetrahedra (k, 4), turned so that all are positive."""
+    a, b, c, d = points[cells].transpose(1, 0, 2)
+    wrong = np.einsum("ki,ki->k", np.cross(b - a, c - a), d - a) < 0.0
+    cells[wrong] = cells[wrong][:, [0, 2, 1, 3]]
+    return points, cells
+
+
+def second_order(points: np.ndarray, cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Points with those in the middle of edges (n, 3), and cells (k, 10) in VTK's order, of tetrahedra (k, 4)."""
+    ends = np.sort(cells[:, EDGES].reshape(-1, 2), axis=1)
+    edges, which = np.unique(ends, axis=0, return_inverse=True)
+    middles = len(points) + which.reshape(-1, len(EDGES))
+    return np.concatenate([points, points[edges].mean(axis=1)]), np.concatenate([cells, middles], axis=1)
 
 
 def glued(points: np.ndarray) -> np.ndarray:

@@ -2,15 +2,17 @@
 
 import itertools
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import NamedTuple
 
+import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.ticker import PercentFormatter
 
+from studies.lab.silicone.cylinder import CONTESTANTS, COULOMB, FINER, REFERENCE, SLIDES
 from studies.plots.style.page import blank, finish, page, panels
-from studies.plots.style.style import BLACK, BLUE, GREEN, GREY, MUTED, ORANGE, PURPLE, SKY, VERMILLION, save, styled
+from studies.plots.style.style import BLACK, BLUE, GREEN, GREY, MUTED, ORANGE, PURPLE, SKY, VERMILLION, styled
 
 TITLE = "A silicone beam let go: E and damping fitted without a load, the rest predicted"
 LOOKS = tuple(zip((BLUE, SKY, GREEN, ORANGE, PURPLE, GREY, BLACK, *MUTED[:3]), "os^vDsXP*<", strict=True))
@@ -104,6 +106,41 @@ def _draw(
     return beyond
 
 
-def draw(rows: Sequence[Point], bars: Mapping[str, Sequence[Bar]], path: Path) -> None:
-    """Writes the chart as PNG. Raises StudyError if it cannot be written."""
-    save(figure(rows, bars), path)
+PRESS_TITLE = "Silicone cylinders under a plate: two numbers fitted between 5 and 20 %, the force beyond predicted"
+OF_FAMILY = (GREEN, ORANGE, PURPLE)
+OF_BODIES = {CONTESTANTS[0].name: SKY, FINER: BLUE, SLIDES: GREY}
+
+
+@styled
+def press_figure(
+    curves: pd.DataFrame, measured: pd.DataFrame, scatter: pd.DataFrame, errors: Mapping[str, pd.DataFrame]
+) -> Figure:
+    """Force over that of plates that slide, `curves` beside `measured` (a column by material, rows of `compression`);
+    and medians of `errors` [%] beside those of `scatter` [%] (columns of compressions)."""
+    sheet = page(12, 5)
+    left, right = panels(sheet, 1, 2)[0]
+    names = dict.fromkeys(name.split("_")[0] for name in measured)
+    families = dict(zip(names, itertools.cycle(OF_FAMILY), strict=False))
+    for name in measured:
+        left.plot(measured.index, measured[name], color=families[name.split("_")[0]], linewidth=0.8)
+    left.plot(curves["compression"], curves[REFERENCE], color=BLACK, linewidth=2.5)
+    for name, colour in OF_BODIES.items():
+        left.plot(curves["compression"], curves[name], color=colour, linewidth=1.3, linestyle="--")
+    rubbed = dict(zip(COULOMB.values(), (":", "-."), strict=True))
+    for name, dots in rubbed.items():
+        left.plot(curves["compression"], curves[name], color=VERMILLION, linewidth=1.3, linestyle=dots)
+    left.set(xlabel="compression", ylabel="force / force of plates that slide [1]", ylim=(0.95, 1.7))
+    for (name, table), (colour, marker) in zip(errors.items(), LOOKS, strict=False):
+        right.plot(table.columns, table.abs().median(), color=colour, marker=marker, linewidth=1.3, label=name)
+    right.plot(scatter.columns, scatter.median(), color=VERMILLION, linewidth=2.5, label="scatter of ten runs")
+    right.set(xlabel="compression", ylabel="median error on sample B [%]", ylim=(0.0, None))
+    for axes in (left, right):
+        axes.xaxis.set_major_formatter(PercentFormatter(1.0, 0))
+    handles = [
+        *(Line2D([], [], color=colour, label=f"measured, {name}") for name, colour in families.items()),
+        Line2D([], [], color=BLACK, linewidth=2.5, label="reference, plates stick"),
+        *(Line2D([], [], color=colour, linestyle="--", label=name) for name, colour in OF_BODIES.items()),
+        *(Line2D([], [], color=VERMILLION, linestyle=dots, label=name) for name, dots in rubbed.items()),
+        *right.lines,
+    ]
+    return finish(sheet, PRESS_TITLE, handles, columns=3)
