@@ -143,14 +143,22 @@ def reach_beyond() -> list[float | str]:
     return [part for one in errors if one[2] + one[3] > one[4] for part in one]
 
 
-def missed_scene() -> list[float | str]:
-    ((scene, choice),) = ((scene, choice) for scene, choice in choices().items() if not choice.meets)
-    ((name, (size, bar, most)),) = errors_of(scene).items()
-    assert size - bar > most, "the reference decides"
-    adaptive = of(rows("accuracy"), scene=scene, body=ADAPTIVE)
-    assert (adaptive["status"] == "inverted").all()
-    counted = (len(adaptive), *span(adaptive[MEAN]), adaptive[floor(MEAN)].max())
-    return [scene, choice.body.case.body.nodes, most, name, size, *counted]
+def open_scene() -> list[float | str]:
+    """The scene without an accurate body, how many of its adaptive ones end well and how far off they are."""
+    (scene,) = (scene for scene, choice in choices().items() if not choice.meets)
+    ((size, bar, most),) = errors_of(scene).values()
+    assert size - bar < most, "the reference does not decide"
+    adaptive = of(quadratic(), scene=scene)
+    adaptive = adaptive[adaptive["body"].str.startswith("adaptive")]
+    well = of(adaptive, status="ok")
+    assert set(adaptive["status"]) == {"ok", "folded"}
+    return [scene, len(well), len(adaptive), *span(well[MEAN]), well[floor(MEAN)].max(), most]
+
+
+def quadratic() -> pd.DataFrame:
+    """The study of accuracy, where heavy masses are named as those by stiffness."""
+    table = rows("accuracy")
+    return table.assign(body=table["body"].str.replace("heavy masses", "masses by stiffness"))
 
 
 @cache
@@ -254,7 +262,7 @@ def second_code(scene: str) -> list[float]:
 
 def five(scene: str, body: str, nodes: int) -> pd.DataFrame:
     """The rows of a recipe on its five neighbouring meshes."""
-    near = of(rows("accuracy"), scene=scene, body=body)
+    near = of(quadratic(), scene=scene, body=body)
     near = near[(near["nodes"] / nodes - 1).abs() < 0.07]
     assert len(near) == 5
     return near
@@ -348,10 +356,8 @@ ROWS = [
         "grows in # of # cases", lambda: one_volume()[1:]),
     (FINDINGS, "a step takes # to # % longer with # and # to # % longer with # surface nodes", constraint_costs),
     (FINDINGS, "In @ (@ # ± # %, target # %) the uncertainty reaches beyond the target.", reach_beyond),
-    (FINDINGS, "@ is missed: all # adaptive bodies invert on the way and are # to # ± # % off (target # %)", lambda: (
-        missed_scene()[0], *missed_scene()[5:], missed_scene()[2])),
-    (FINDINGS, "@ is the only one below real time",
-        lambda: [scene for scene, speed in met().items() if speed < 1]),
+    (FINDINGS, "@ is not decided: # of # adaptive bodies end well and are # to # ± # % off (target # %)", open_scene),
+    (FINDINGS, "The slowest recommended body runs at # times real time", lambda: [min(met().values())]),
     (README, "95 of 100 random livers are within # % in force and 95 within # % in displacement",
         lambda: random_organ("liver")[:4:2]),
     *((PEOPLE, f"| {organ} | #, #, # | #, #, # | #, # | # of # |", lambda organ=organ: finest(organ))
@@ -449,7 +455,7 @@ ROWS = [
     *(("docs/accuracy.md", words, lambda column=column, nodes=nodes, body=body: near_liver(body, nodes, column))
       for words, body, nodes, column in (
           ("have force errors of # to # %", UNIFORM, 594, FORCE), ("mean errors of # to # %;", UNIFORM, 594, MEAN),
-          ("1,266 nodes # to # %", ADAPTIVE, 1194, FORCE), ("2.4 % and # to # %", ADAPTIVE, 1194, MEAN))),
+          ("1,266 nodes # to # %", ADAPTIVE, 1194, FORCE), ("2.2 % and # to # %", ADAPTIVE, 1194, MEAN))),
     *(("docs/accuracy.md", f"| {scene} |{' #, #, # |' * len(MIXED)}", lambda scene=scene: [
         number for body, nodes in MIXED for number in worst_of(scene, body, nodes, FORCE, MEAN)])
       for scene in ("ball_clamped", "liver_press", "liver_probe", "kidney_probe", "stomach_press")),

@@ -200,8 +200,8 @@ def test_each_indicator_has_a_remark_beyond_its_bound(changed, word):
 
 
 def test_what_is_missed_at_outlines_is_bounded_by_the_target_of_what_is_compared():
-    """Of kidneys 594 nodes missed 17 and 7.4 % of the force of a pull (0.08 and 0.095), 1,594 nodes 1.8 % (0.018); of
-    the displacement of one that hangs 1.4 % (0.015)."""
+    """Of kidneys 594 nodes missed 17 and 7.4 % of the force of a pull (0.08 and 0.095), 1,594 nodes 1.8 % at 0.018; of
+    the displacement of one that hangs 1.4 % at 0.015."""
     for missed, told in ((0.08, True), (0.095, True), (0.018, False)):
         assert bool(remarks(BALL_CLAMPED, GOOD | {"missed_at_outlines": missed})) == told
     for scene in (SPLEEN_SAG, replace(BALL_CLAMPED, gravity=(0.0, 0.0, -9.81))):
