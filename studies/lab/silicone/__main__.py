@@ -62,7 +62,7 @@ def judge_presses(runs: list[press.Run], known: Path | None, place: Callable[[st
     if known is None:
         write(curves(), place("press_curves.csv"))
         write(sticking_moduli(), place("press_modulus.csv"))
-    table = pd.read_csv(known or place("press_curves.csv"))
+    table = press.read_curves(known or place("press_curves.csv"))
     found, stick = list(press.options(runs, table)), press.law(table)
     write(press.table_of_materials(runs, table, found), place("press.csv"))
     write(press.table_of_laws(found), place("press_laws.csv"))

@@ -62,7 +62,10 @@ def read_runs(path: Path) -> list[Run]:
     """The runs of a CSV with the columns of HEAD, plain or .xz; their names begin with that of the sample. Raises
     StudyError for a file without these columns, and for one without samples A and B of every material."""
     raw = path.read_bytes()
-    text = (lzma.decompress(raw) if path.suffix == ".xz" else raw).decode()
+    try:
+        text = (lzma.decompress(raw) if path.suffix == ".xz" else raw).decode()
+    except (lzma.LZMAError, UnicodeDecodeError) as error:
+        raise StudyError(f"{path} is no text ({error}); give a CSV, plain or .xz") from error
     if HEAD not in text:
         raise StudyError(f"{path} has no line '{HEAD}'; give these columns")
     table = pd.read_csv(StringIO(text[text.index(HEAD) :]))
@@ -74,6 +77,18 @@ def read_runs(path: Path) -> list[Run]:
         if not any((run.material, run.sample) == (material, sample) for run in runs):
             raise StudyError(f"{path} has no sample {sample} of {material}; name its runs A1, A2 …, B1, B2 …")
     return runs
+
+
+def read_curves(path: Path) -> pd.DataFrame:
+    """The table of `cylinder.curves` in a CSV. Raises StudyError for another file."""
+    try:
+        table = pd.read_csv(path)
+    except ValueError as error:
+        raise StudyError(f"{path} is no table ({error}); give press_curves.csv of an earlier run") from error
+    missing = {"compression", REFERENCE, MOONEY, YEOH, FINER, *COULOMB.values()} - {*table}
+    if missing:
+        raise StudyError(f"{path} lacks {', '.join(sorted(missing))}; give press_curves.csv of an earlier run")
+    return table
 
 
 def law(curves: pd.DataFrame, kind: str = STICK, number: float = 0.0) -> Law:

@@ -129,3 +129,15 @@ def test_the_command_makes_the_published_tables_of_the_published_curves(tmp_path
         made, published = (pd.read_csv(folder / f"{name}.csv") for folder in (tmp_path / "silicone", PUBLISHED))
         pd.testing.assert_frame_equal(made, published, rtol=1e-2, atol=1e-2)
     assert (tmp_path / "silicone" / "press.png").stat().st_size > 10_000
+
+
+@pytest.mark.parametrize(
+    ("content", "words"), [(b"material,run\n", "lacks .*reference"), (b"", "is no table"), (b"\xff\xfe\x00", "is no")]
+)
+def test_other_files_are_refused(tmp_path, content, words):
+    other = tmp_path / "other.csv"
+    other.write_bytes(content)
+    with pytest.raises(StudyError, match=words):
+        press.read_curves(other)
+    with pytest.raises(StudyError, match=r"no line|is no text"):
+        press.read_runs(other)
