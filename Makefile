@@ -39,6 +39,7 @@ publish: setup-verify compiled ## all that is published, again, by this machine 
 	$(BIN)/organbench run $$($(BIN)/python -c "import studies; print(*(study.name for study in studies.STUDIES))")
 	$(BIN)/organbench run studies/lab/population/study.py
 	$(BIN)/python -m studies.lab.population
+	$(BIN)/python -m studies.lab.population.intervals results/population
 	$(BIN)/python -m studies.lab.verify
 	$(BIN)/organbench report --figures
 	$(BIN)/python -m studies.lab.silicone

@@ -19,8 +19,8 @@ BODIES = "bodies"
 
 def study_of(scene: Scene) -> Study:
     """Springs alone, one kept volume, and quadratic elements on two meshes in `scene`, with charts and a recorded
-    surface. The study has the name of the scene. Where the two meshes differ, neither is to be trusted; with fewer than
-    FINEST nodes that they agree says too little (studies.metrics.trust)."""
+    surface. The study has the name of the scene. The difference of the two meshes bounds the errors of both
+    (studies.metrics.interval)."""
     cases = (
         Case(scene, TetrahedralBody(), Free(), recorded=RECORDED),
         Case(scene, TetrahedralBody(), ImplicitVolume(), recorded=RECORDED),
@@ -33,7 +33,17 @@ def study_of(scene: Scene) -> Study:
         Chart("volume.png", "studies.plots.volume_history:draw"),
         Chart("force.png", "studies.plots.force_path:draw"),
     )
-    columns = ("volume_worst", "force_end", "mean_error", "shape_error", "shape_volume", "silhouette_error", "min_j")
+    columns = (
+        "volume_worst",
+        "force_end",
+        "mean_error",
+        "force_within",
+        "mean_within",
+        "shape_error",
+        "shape_volume",
+        "silhouette_error",
+        "min_j",
+    )
     return Study(scene.name, f"How do four bodies do in {scene.title}?", cases, charts, columns)
 
 

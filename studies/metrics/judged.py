@@ -18,6 +18,7 @@ from studies.store.record import Status
 
 NAN = float("nan")
 FORCE, DISPLACEMENT = metric("force_end"), metric("mean_error")
+WITHIN = metric("force_within"), metric("mean_within")
 DISTANCE, VOLUME = metric("shape_error"), metric("shape_volume")
 
 
@@ -62,6 +63,8 @@ class Judged:
     """shape_volume [%], signed."""
     members: "tuple[Judged, ...]" = ()
     """For a recipe that ran on five neighbouring meshes: the result on each; the errors above are then the largest."""
+    bounds: bool = False
+    """Whether no reference judges it, and its errors are what 90 of 100 stay within (studies.metrics.interval)."""
 
     @property
     def advisable(self) -> bool:
@@ -107,9 +110,11 @@ def judged(run: Run) -> Judged | None:
     """The results of a run; None if it did not end well."""
     if run.record.status != Status.OK:
         return None
-    force, displacement = (Measured(entry(run), entry.uncertainty(run)) for entry in (FORCE, DISPLACEMENT))
-    shape, volume = Measured(DISTANCE(run)), Measured(VOLUME(run))
-    one = Judged(run.case, force, displacement, dt=float(run.attributes.dt), shape=shape, shape_volume=volume)
+    alone = run.reference is None
+    entries = WITHIN if alone else (FORCE, DISPLACEMENT)
+    force, displacement = (Measured(entry(run), entry.uncertainty(run)) for entry in entries)
+    one = Judged(run.case, force, displacement, dt=float(run.attributes.dt), bounds=alone)
+    one = replace(one, shape=Measured(DISTANCE(run)), shape_volume=Measured(VOLUME(run)))
     return one if run.timing is None else with_times(one, run.timing, float(run.attributes.frame))
 
 

@@ -5,20 +5,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from massspring import Capsule, Sphere
-from massspring.world.depth import facets_within
 from studies.geometry.mesh.organ_mesh import tetrahedron_volumes
 from studies.geometry.surface.distance import hausdorff
-from studies.geometry.surface.sides import along_facets
-from studies.meshing.bounds import FEW
-from studies.meshing.rest_surface import OUTER
 from studies.metrics import cutting
+from studies.metrics.contact import contact_facets
+from studies.metrics.interval import interval
 from studies.metrics.metric import PERCENT, Metric, compared
 from studies.metrics.run import Run
 from studies.reference.ringing import ringing_frequency
-
-TOUCH = 1e-3
-"""Distance to an obstacle, over the size of the body, below which a point touches it."""
 
 
 def volume_worst(run: Run) -> float:
@@ -81,6 +75,16 @@ def mean_error(run: Run) -> float:
     """
     mean, largest = run.true_surface_error
     return PERCENT * mean / largest
+
+
+def force_within(run: Run) -> float:
+    """What 90 of 100 errors of the force stay within, by a second mesh [%]; NaN with a reference."""
+    return interval(run).force
+
+
+def mean_within(run: Run) -> float:
+    """What 90 of 100 mean errors of the displacement stay within, by a second mesh [%]; NaN with a reference."""
+    return interval(run).displacement
 
 
 def shape_error(run: Run) -> float:
@@ -224,31 +228,6 @@ def unbalanced(run: Run) -> float:
     return PERCENT * float(run.record.attributes.get("unbalanced", np.nan))
 
 
-def contact_facets(run: Run) -> float:
-    """Outer facets with a point within 0.1 % of the size of the probed obstacle at the last checkpoint [1].
-
-    NaN if the force is not that of an obstacle, or the facets are unknown."""
-    scene, sides = run.case.scene, run.sides
-    if scene.probed.what != "obstacle" or sides is None or scene.probed.number >= len(scene.obstacles):
-        return float("nan")
-    facets = sides[OUTER].facets
-    places, _ = along_facets(run.fields.snapshots[-1], facets)
-    gap = scene.obstacles[scene.probed.number].gap(places, scene.checkpoints[-1])
-    return float((gap.reshape(len(facets), -1) < TOUCH * run.size).any(axis=1).sum())
-
-
-def few_facets(run: Run) -> bool:
-    """Whether a sphere or capsule touches at least one and fewer than FEW outer facets at the last checkpoint: its
-    nearest point of each within 0.1 % of the size."""
-    scene = run.case.scene
-    sides = run.sides if run.record.fields else None  # a case that failed has none
-    if sides is None or not len(run.fields.snapshots):
-        return False
-    x, facets, t = run.fields.snapshots[-1], sides[OUTER].facets, scene.checkpoints[-1]
-    rounds = [one for one in scene.obstacles if isinstance(one, Sphere | Capsule)]
-    return any(0 < facets_within(one, x, facets, t, TOUCH * run.size).sum() < FEW for one in rounds)
-
-
 def contact_turn(run: Run) -> float:
     """Angle between the force of the probed obstacle and its push at the last checkpoint [deg].
 
@@ -324,6 +303,8 @@ METRICS: tuple[Metric, ...] = (
     interior_error,
     mean_error,
     silhouette_error,
+    Metric("force_within", "%", "lower", force_within),
+    Metric("mean_within", "%", "lower", mean_within),
     Metric("shape_error", "%", "lower", shape_error),
     Metric("shape_volume", "%", "-", shape_volume),
     opening_error,

@@ -45,6 +45,8 @@ class Run:
     record: Record
     reference: Reference | None = None
     timing: FrameTiming | None = None
+    second: "Run | None" = None
+    """Where no reference judges it: the same recipe on another mesh (studies.metrics.interval)."""
 
     @staticmethod
     def load(path: Path | str) -> "Run":

@@ -19,8 +19,9 @@ from studies.metrics.cells import (
     UNCONVERGED_NOTE,
     UNRESOLVED_NOTE,
 )
+from studies.metrics.contact import few_facets
 from studies.metrics.metric import Metric
-from studies.metrics.metrics import METRICS, few_facets
+from studies.metrics.metrics import METRICS
 from studies.metrics.run import Run
 from studies.metrics.wish import missed
 from studies.reference.uncertainty import QUANTITIES

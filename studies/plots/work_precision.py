@@ -93,7 +93,8 @@ def figure_of(scenes: dict[str, list[Judged]], runs: Sequence[Run]) -> Figure:
 
 
 def _judged(group: Sequence[Run]) -> list[Judged]:
-    return [one for one in over_meshes(filter(None, map(judged, group))) if one.cost.known or is_entry(one.case)]
+    bodies = over_meshes(one for one in map(judged, group) if one is not None and not one.bounds)
+    return [one for one in bodies if one.cost.known or is_entry(one.case)]
 
 
 def _ends(values: Sequence[float]) -> tuple[float, float]:

@@ -16,6 +16,7 @@ from studies.exchange.entry import FOLDER as SUBMISSIONS
 from studies.exchange.entry import entries_beside
 from studies.exchange.league import LEAGUE
 from studies.geometry import SHAPES, organ
+from studies.metrics.interval import RULE_FILE
 from studies.metrics.run import Run
 from studies.metrics.table import metric, study_table
 from studies.report.league import NAME as LEAGUE_NAME
@@ -176,6 +177,7 @@ class StudyDrawing:
         drawings = [entry.of for entry in metrics] + [chart.drawing for chart in study.charts]
         own = {file.sha256 for file in map(file_of, drawings) if file is not None}
         names = [*(job.digest for job in jobs), *(entry.name for entry in metrics), *sorted(own), study.word]
+        names.append(RULE_FILE.read_text(encoding="utf-8"))
         files = ledger.state([*jobs, *reference_jobs(ledger.root, study.scenes)])
         return state_of(files, *(entry.written if entry else "-" for entry in others), *names)
 

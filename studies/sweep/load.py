@@ -7,6 +7,7 @@ from pathlib import Path
 from studies.base.doing import doing
 from studies.base.errors import OtherVersion, StudyError
 from studies.catalog.study import Study
+from studies.metrics.interval import second_mesh
 from studies.metrics.metric import Metric
 from studies.metrics.run import Run
 from studies.metrics.table import Row, row_of
@@ -66,8 +67,8 @@ def load_runs(root: Path, study: Study, references: References | None = None) ->
     """
     references = references or References(Ledger(root))
     runs, problems = list[Run](), reference_problems(references, study)
-    for job in case_jobs(root, study):
-        run, missing = load_run(references, job)
+    for job in (jobs := case_jobs(root, study)):
+        run, missing = load_run(references, job, jobs)
         runs += [run] if run else []
         problems += missing
     return runs, sentences([*problems, *references.warnings(study.scenes)])
@@ -75,18 +76,18 @@ def load_runs(root: Path, study: Study, references: References | None = None) ->
 
 def table_rows(references: References, study: Study, metrics: Sequence[Metric]) -> tuple[list[Row], list[str]]:
     """A row per stored case (studies.metrics.table), and what is missing or damaged, or a reference warns
-    of, in sentences. One run is in memory
-    at a time."""
+    of, in sentences. One run is in memory at a time, and its second mesh."""
     rows, problems = list[Row](), reference_problems(references, study)
-    for job in case_jobs(references.ledger.root, study):
-        run, missing = load_run(references, job)
+    for job in (jobs := case_jobs(references.ledger.root, study)):
+        run, missing = load_run(references, job, jobs)
         rows += [row_of(run, metrics)] if run else []
         problems += missing
     return rows, sentences([*problems, *references.warnings(study.scenes)])
 
 
-def load_run(references: References, job: CaseJob) -> tuple[Run | None, list[StudyError]]:
-    """The run of a case with its reference and frame times, None where it cannot be read; and what is wrong."""
+def load_run(references: References, job: CaseJob, jobs: Sequence[CaseJob] = ()) -> tuple[Run | None, list[StudyError]]:
+    """The run of a case with its reference and frame times, None where it cannot be read; and what is wrong. jobs:
+    those among which a run without a reference has its second mesh."""
     ledger = references.ledger
     doing(job.label)
     try:
@@ -96,6 +97,9 @@ def load_run(references: References, job: CaseJob) -> tuple[Run | None, list[Stu
         if entry.fault:
             raise entry.error()
         run = Run(job.work, read_record(job.path), references.of(job.work.scene))
+        if run.reference is None and (other := second_mesh(job.work, [one.work for one in jobs])) is not None:
+            second = next(one for one in jobs if one.work == other)
+            run = replace(run, second=load_run(references, second)[0])
     except StudyError as problem:
         return None, [problem]
     try:

@@ -20,7 +20,7 @@ from studies.cli.options import case_named
 from studies.cli.progress import TerminalProgress, dry_run
 from studies.cli.terminal import PROGRAM, SMOKE, Results, Smoke, console, say, warn
 from studies.geometry.mesher.jobs import cache_folder
-from studies.metrics.trust import is_compared, verdicts
+from studies.metrics.interval import sentences
 from studies.reference.reference_solves import STUDY as REFERENCES
 from studies.report.results import refresh
 from studies.report.results import report as write_report
@@ -181,7 +181,9 @@ class Work:
         for sentence in causes(odd):
             say(f"  {sentence}")
         if study.name not in {each.name for each in STUDIES}:
-            say_trust(root, study)
+            quadratic = tuple(case for case in study.cases if case.body.kind == "quadratic")
+            for sentence in sentences(load_runs(root, replace(study, cases=quadratic))[0]):
+                say(sentence)
         return not odd
 
     def time_again(self, dry: bool) -> None:
@@ -198,11 +200,3 @@ class Work:
         if self.drawn:
             warn(refresh(self.ledger, self.study)[1])
         say(f"{name}: {count} stored cases were timed again, {'charts' if self.drawn else 'times'} in {self.folder}")
-
-
-def say_trust(root: Path, study: Study) -> None:
-    """Whether two meshes of a scene without a reference agree."""
-    compared = tuple(case for case in study.cases if is_compared(case.body))
-    for verdict in verdicts(load_runs(root, replace(study, cases=compared))[0]):
-        answer = "yes" if verdict.trusted else "no: use more nodes"
-        say(f"{verdict.scene}: trust its best body: {answer}, because {verdict.why}")

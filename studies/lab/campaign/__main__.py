@@ -10,7 +10,6 @@ import multiprocessing
 import os
 import resource
 import signal
-import subprocess
 import sys
 import time
 from collections import Counter
@@ -24,6 +23,7 @@ from studies import StudyError
 from studies.catalog.accuracy import BUDGETS, FINEST
 from studies.lab.campaign.draw import MOST, member
 from studies.lab.campaign.outcome import Outcome, judge, told
+from studies.lab.commit import commit
 
 CELLS = [f"{told}, {truth}" for told in ("silent", "doubted") for truth in ("right", "wrong", "far", "undecided")]
 FINE, WORST_FIRST = ("silent, right", "doubted, right", "not ok", "refused"), [*CELLS, "crashed"]
@@ -77,12 +77,6 @@ def _store(path: Path, row: dict[str, Any]) -> None:
     new = path.with_suffix(".new")
     new.write_text(json.dumps(row, indent=1) + "\n", encoding="utf-8")
     os.replace(new, path)
-
-
-def commit() -> str:
-    """Of the code, "-dirty" if files differ from it."""
-    words = "git", "describe", "--always", "--dirty", "--exclude=*"
-    return subprocess.run(words, cwd=Path(__file__).parent, capture_output=True, text=True).stdout.strip() or "unknown"
 
 
 def table_of(rows: list[dict[str, Any]], again: str) -> tuple[str, int]:

@@ -21,9 +21,9 @@ from studies import (
 )
 from studies.catalog.accuracy import LONG, even
 from studies.catalog.of_scene import study_of
+from studies.metrics.contact import few_facets
+from studies.metrics.interval import apart, interval
 from studies.metrics.judged import DISPLACEMENT, FORCE
-from studies.metrics.metrics import few_facets
-from studies.metrics.trust import apart, verdicts
 from studies.metrics.wish import usual_wish
 from studies.runs.current import case_path
 from studies.runs.indicators import remarks
@@ -97,8 +97,12 @@ def told(root: Path, scene: Scene, nodes: int) -> Ended:
         if coarse is None:
             one.doubts.append(f"the coarser mesh is {other.status}: {other.message}")
         else:
-            one.doubts += [verdict.why for verdict in verdicts([coarse, fine]) if not verdict.trusted]
-            one.signs |= {f"apart_{name}": value for name, value in apart(coarse, fine)._asdict().items()}
+            within, wish = interval(replace(fine, second=coarse)), usual_wish(scene)
+            one.doubts += [within.why] if within.why else []
+            for name, change in apart(coarse, fine)._asdict().items():
+                half, target = getattr(within, name), getattr(wish, name)
+                one.doubts += [f"{name} ± {half:.2g} % (target {target:g})"] if half > target else []
+                one.signs |= {f"apart_{name}": change, f"within_{name}": half}
     return ended
 
 

@@ -4,10 +4,15 @@ import sys
 from pathlib import Path
 
 from studies import load_runs
+from studies.lab.population.intervals import PAIRS, pairs_of
 from studies.lab.population.study import POPULATION, STUDY
-from studies.lab.population.tables import members_of, trust_of, worst_of
+from studies.lab.population.tables import members_of, worst_of
 
-TEXTS = {"population.md": members_of, "worst.md": worst_of, "trust.md": trust_of}
+TEXTS = {
+    "population.md": members_of,
+    "worst.md": worst_of,
+    PAIRS: lambda runs: pairs_of(runs).to_csv(index=False, float_format="%.4g").rstrip(),
+}
 
 
 def main(results: Path = Path("results")) -> None:

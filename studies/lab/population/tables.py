@@ -1,21 +1,17 @@
-"""Tables of a population: errors of every body, an analysis of the ten worst members of every organ, and how often the
-comparison of two meshes detects a member whose error is too large."""
+"""Tables of a population: errors of every body, and an analysis of the ten worst members of every organ."""
 
 from collections.abc import Sequence
 
 import numpy as np
 
 from studies import Metric, Run, Status
-from studies.lab.population.warning import Judgement, judgements, tally
+from studies.metrics.contact import contact_facets
 from studies.metrics.distribution import Distribution, Group, groups
 from studies.metrics.judged import DISPLACEMENT, FORCE
-from studies.metrics.metrics import contact_facets, contact_turn
-from studies.metrics.trust import ENOUGH
+from studies.metrics.metrics import contact_turn
 
 WORST = 10
 """Number of members of each organ that are analysed."""
-CHOSEN_ON = {"liver": 27, "kidney": 27, "stomach": 27, "spleen": 30, "bladder": 30}
-"""Members of each organ, the first ones, on which the rule of the warning was chosen (studies.metrics.trust)."""
 
 
 def members_of(runs: Sequence[Run]) -> str:
@@ -110,39 +106,3 @@ def rigid_share(run: Run) -> float:
     wrong = (root * errors.wrong).ravel()
     left = wrong - motions @ np.linalg.lstsq(motions, wrong)[0]
     return 100.0 * (1.0 - float(left @ left) / float(wrong @ wrong))
-
-
-def trust_of(runs: Sequence[Run]) -> str:
-    """How often the comparison of two meshes names a member whose finer body is beyond the target, and doubts one that
-    is within, of the members on which its rule was chosen and of those drawn later; and how many bodies with fewer
-    nodes, which are never trusted, are beyond the target and yet alike."""
-    comparisons = judgements(runs)
-    lines = [
-        "| organ | chosen on: beyond the target, named | within it, doubted "
-        "| judged on: beyond the target, named | within it, doubted | fewer nodes: beyond the target, alike |",
-        "|---|---|---|---|---|---|",
-    ]
-    organs: dict[str, list[Judgement]] = {}
-    for one in comparisons:
-        organs.setdefault(_organ(one), []).append(one)
-    for organ, some in [*organs.items(), ("all", comparisons)]:
-        fine = [one for one in some if one.nodes >= ENOUGH]
-        earlier = [one for one in fine if _number_of(one) < CHOSEN_ON.get(_organ(one), 0)]
-        later = [one for one in fine if one not in earlier]
-        cells = []
-        for part in (earlier, later):
-            count = tally(part)
-            cells += [f"{count.beyond}, {count.named}", f"{count.within}, {count.doubted}"] if part else ["–", "–"]
-        coarse = [one for one in some if one.nodes < ENOUGH]
-        beyond = [one for one in coarse if not one.within]
-        cells.append(f"{len(beyond)}, {sum(one.alike for one in beyond)}" if coarse else "–")
-        lines.append(f"| {organ} | " + " | ".join(cells) + " |")
-    return "\n".join(lines)
-
-
-def _organ(one: Judgement) -> str:
-    return one.scene.split("_")[0]
-
-
-def _number_of(one: Judgement) -> int:
-    return int(one.scene.rsplit("_", 1)[1])

@@ -8,6 +8,7 @@ from studies.base.counting import counted, readable
 from studies.exchange.entry import sides_of
 from studies.meshing.bounds import REFERENCE_SHAPE, SHAPE, SHAPE_VOLUME, enough
 from studies.metrics.cells import DISTURBED_MARK, MISSING, plain, value_cell
+from studies.metrics.interval import OF_100
 from studies.metrics.judged import Judged, Measured, by_cost
 from studies.metrics.run import Run
 from studies.metrics.table import DISTURBED, OFF_SHAPE, PROCESSOR
@@ -95,7 +96,7 @@ def _row(one: Judged, number: str, words: str = "") -> Best:
         for name, number in numbers.items()
     }
     words = words or f"{body_words(one.case.body)}, {one.case.dt_fraction:g}"
-    row = {"body": words, "case": number, "meshes": max(1, len(one.members)), **pairs}
+    row = {"body": words, "case": number, "meshes": max(1, len(one.members)), "bounds": one.bounds, **pairs}
     return row | {DISTURBED: bool(one.disturbed), PROCESSOR: one.processor}
 
 
@@ -209,10 +210,17 @@ def _body(words: str) -> str:
 
 
 def _errors(rows: Sequence[Best]) -> str:
+    """Those of scenes with a reference, then those of scenes without (studies.metrics.interval)."""
+    groups = ([row for row in rows if bool(row.get("bounds")) == bounds] for bounds in (False, True))
+    return "; ".join(filter(None, map(_errors_of, groups)))
+
+
+def _errors_of(rows: Sequence[Best]) -> str:
     force, displacement, shape = (_span(rows, name) for name in ("force", "displacement", "shape"))
+    most = f" at most in {OF_100} of 100 such bodies" if any(row.get("bounds") for row in rows) else ""
     words = {
-        f"force off by {force} %": force,
-        f"mean displacement error {displacement} %": displacement,
+        f"force off by {force} %{most}": force,
+        f"mean displacement error {displacement} %{most}": displacement,
         f"shape off by {shape} % of the organ's size at most": shape,
     }
     return ", ".join(part for part, span in words.items() if span)
@@ -244,7 +252,8 @@ def _span(rows: Sequence[Best], name: str) -> str:
     """The number of one row with its uncertainty, or the range of sizes over several."""
     numbers = sorted((row[name] for row in rows if row[name]), key=lambda number: abs(number[0]))
     if len(numbers) < 2:
-        return "".join(value_cell(*number, signed=name == "force") for number in numbers)
+        signed = name == "force" and not any(row.get("bounds") for row in rows)
+        return "".join(value_cell(*number, signed=signed) for number in numbers)
     low, high = (plain(float(f"{abs(number[0]):.2g}")) for number in (numbers[0], numbers[-1]))
     return low if low == high else f"{low} to {high}"
 
@@ -266,5 +275,7 @@ def _cells(row: Best) -> dict[str, Any]:
     # Parts that are older have no volume.
     pairs = {name: number for name in NUMBERS if (number := row.get(name))}
     numbers = [value_cell(*pairs[name], signed=name in SIGNED) if name in pairs else MISSING for name in NUMBERS]
+    if row.get("bounds"):
+        numbers[:2] = [f"≤ {number.lstrip('+')}" if number != MISSING else MISSING for number in numbers[:2]]
     numbers[NUMBERS.index("speed")] += f" {DISTURBED_MARK}" if row.get(DISTURBED) else ""
     return {"case": row["case"], "body": row["body"], "numbers": numbers}

@@ -22,6 +22,8 @@ Cell = tuple[str, str | None, str]
 COLUMNS = {
     "force_end": "force",
     "mean_error": "displacement, mean",
+    "force_within": "force, 90 of 100 within",
+    "mean_within": "displacement, 90 of 100 within",
     "shape_error": "shape / size",
     "shape_volume": "volume of the shape",
     "volume_worst": "worst |V/V0 − 1|",

@@ -3,6 +3,7 @@
 from studies.catalog.accuracy import ACCURACY
 from studies.meshing.bounds import SHAPE, SHAPE_VOLUME
 from studies.metrics.cells import MISSING, value_cell
+from studies.metrics.interval import OF_100
 from studies.metrics.judged import Judged, Measured
 from studies.metrics.wish import Wish
 from studies.runs.case import Case
@@ -103,7 +104,7 @@ def _recipe(answer: Advice, one: Judged) -> list[str]:
     step = f", {1e3 * one.dt:.3g} ms" if one.dt == one.dt else ""
     rows = {
         "recipe": f"{case.body.series}, {case.body.nodes:,} surface nodes, dt = {case.dt_fraction:g} dt_c{step}",
-        "force": _error(one.force, True) + _meshes(one, "force"),
+        "force": _error(one.force, not one.bounds) + _meshes(one, "force"),
         "displacement": f"{_error(one.displacement)} (mean over the true surface, of the largest)"
         + _meshes(one, "displacement"),
         "shape": _shape(one),
@@ -120,6 +121,8 @@ def _recipe(answer: Advice, one: Judged) -> list[str]:
 def _meshes(one: Judged, name: str) -> str:
     if not getattr(one, name).known:
         return ""
+    if one.bounds:
+        return f", which {OF_100} of 100 such bodies stay within, by two meshes without a reference"
     if not one.members:
         return ", on one mesh: neighbouring meshes may differ several times"
     scenes = {mesh.case.scene.name for mesh in one.members}

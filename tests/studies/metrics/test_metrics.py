@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from massspring import Plane, Sphere
+from studies.metrics.contact import contact_facets, few_facets
 from studies.metrics.judged import judged
-from studies.metrics.metrics import contact_facets, contact_turn, few_facets, lumen_pressure_error
+from studies.metrics.metrics import contact_turn, lumen_pressure_error
 from studies.metrics.table import DISTURBED, PROCESSOR, frame_of, marked, metric, row_of
 from studies.metrics.timing.protocol import FrameTiming
 from studies.runs.recipes import TetrahedralBody

@@ -1,0 +1,108 @@
+"""`python -m studies.lab.population.intervals`: the rule of studies.metrics.interval by the published members, and
+intervals.md, how it does on organs that it has not seen; with a FOLDER by the members in FOLDER/pairs.csv."""
+
+import json
+import math
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from studies import Run, Status
+from studies.lab.commit import commit
+from studies.metrics.interval import OF_100, RULE_FILE, SIGNS, Apart, bound, load, second_mesh, signs
+from studies.metrics.judged import DISPLACEMENT, FORCE
+
+PUBLISHED, PAIRS = Path("results/published/population"), "pairs.csv"
+NODES = 1194, 1594
+"""Of the two meshes of `organbench run FILE.py`."""
+ERRORS = dict(zip(Apart._fields, (FORCE, DISPLACEMENT), strict=True))
+
+
+def pairs_of(runs: Sequence[Run]) -> pd.DataFrame:
+    """A row for each member whose two adaptive meshes ended well and have a reference: SIGNS, and |errors| [%]."""
+    ended = [run for run in runs if run.reference is not None and run.record.status == Status.OK]
+    cases, rows = [run.case for run in ended], list[dict[str, Any]]()
+    for fine in ended:
+        other = second_mesh(fine.case, cases)
+        if other is not None and (other.body.nodes, fine.case.body.nodes) == NODES:
+            coarse, scene = ended[cases.index(other)], fine.case.scene
+            both = list(zip(NODES, (coarse, fine), strict=True))
+            row = {"scene": scene.name, "load": load(scene), **signs(coarse, fine)}
+            rows.append(row | {f"{name}_{n}": abs(entry(run)) for name, entry in ERRORS.items() for n, run in both})
+    return pd.DataFrame(rows)
+
+
+def rule_of(pairs: pd.DataFrame) -> dict[str, Any]:
+    """The rule by the members of a table of pairs, none for a load with too few. Floors are medians of the changes."""
+    seen = {name: np.fmax if than == "more" else np.fmin for name, (_, than) in SIGNS.items()}  # both pass over NaN
+    rule: dict[str, Any] = {"nodes": list(NODES)}
+    rule["seen"] = {name: float(end.reduce(pairs[name].to_numpy(float))) for name, end in seen.items()}
+    kinds = pairs["load"].to_numpy(str)
+    for name in Apart._fields:
+        change, rule[name] = pairs[name].to_numpy(float), {}
+        for kind in sorted(set(kinds[np.isfinite(change)])):
+            some = np.isfinite(change) & (kinds == kind)
+            floor = float(np.median(change[some]))
+            scores = {str(n): pairs[f"{name}_{n}"].to_numpy(float)[some] / (floor + change[some]) for n in NODES}
+            factor = {n: quantile(score) for n, score in scores.items()}
+            if max(factor.values()) < math.inf:
+                rule[name][kind] = {"members": int(some.sum()), "floor": floor, "factor": factor}
+    return rule
+
+
+def quantile(scores: np.ndarray) -> float:
+    """What the next score stays within with a probability of at least OF_100 %: of n the k-th smallest, k the next
+    whole number to OF_100 % of n + 1 (Lei et al. 2018, algorithm 2); infinite for too few."""
+    k = math.ceil(OF_100 * (len(scores) + 1) / 100)
+    return float(np.sort(scores)[k - 1]) if k <= len(scores) else math.inf
+
+
+def left_out(pairs: pd.DataFrame) -> pd.DataFrame:
+    """Intervals of the finer mesh of the members of each organ by the rule that the other organs give, of an organ that
+    alone has its load by that of its other half (members with even numbers, and odd): how many members, the share of
+    errors inside [%], the median interval, and what OF_100 of 100 errors are within [%]."""
+    words = [scene.split("_") for scene in pairs["scene"]]
+    organ, kind = np.array([word[0] for word in words]), pairs["load"].to_numpy(str)
+    half, rows = np.array([int(word[-1]) % 2 for word in words]), []
+    for name in Apart._fields:
+        change, error = (pairs[column].to_numpy(float) for column in (name, f"{name}_{NODES[1]}"))
+        known, width = np.isfinite(change), np.full(len(pairs), np.nan)
+        for load_, each, part in sorted(set(zip(kind[known], organ[known], half[known], strict=True))):
+            alike = known & (kind == load_)
+            others = alike & (organ != each)
+            rule = rule_of(pairs.loc[others if others.any() else alike & (half != part)])
+            some = alike & (organ == each) & (half == part)
+            if load_ in rule[name]:
+                width[some] = bound(rule[name][load_], change[some], NODES[1])
+        judged = np.isfinite(width)
+        for each in [*dict.fromkeys(organ[judged]), "all"]:
+            some = judged & ((organ == each) | (each == "all"))
+            inside, within = 100.0 * np.mean(error[some] <= width[some]), np.quantile(error[some], OF_100 / 100.0)
+            rows.append((name, each, int(some.sum()), inside, np.median(width[some]), within))
+    return pd.DataFrame(rows, columns=["error", "organ", "members", "inside", "interval", "within"])
+
+
+def intervals_of(pairs: pd.DataFrame) -> str:
+    """`left_out` as a table."""
+    heads = "error", "organ", "members", "inside [%]", "median interval [± %]", f"{OF_100} of 100 errors are within [%]"
+    lines = ["| " + " | ".join(heads) + " |", "|---" * len(heads) + "|"]
+    for error, organ, members, inside, *sizes in left_out(pairs).itertuples(index=False):
+        cells = [error, organ, str(members), f"{inside:.0f}", *(f"{size:.2g}" for size in sizes)]
+        lines.append(f"| {' | '.join(cells)} |")
+    return "\n".join(lines)
+
+
+def main(folder: Path = PUBLISHED) -> None:
+    pairs = pd.read_csv(folder / PAIRS)
+    seeds = sorted(set(pairs["scene"].str.split("_").str[-2].astype(int)))
+    rule = {"seeds": seeds, "commit": commit(), **rule_of(pairs)}
+    RULE_FILE.write_text(json.dumps(rule, indent=2) + "\n", encoding="utf-8")
+    (folder / "intervals.md").write_text(intervals_of(pairs) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main(*map(Path, sys.argv[1:]))
