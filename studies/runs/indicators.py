@@ -52,8 +52,8 @@ OUTLINES = {
     (False, False): ("displacement", 0.01),
     (False, True): ("displacement", 0.03),
 }
-"""Whether a load is a motion, or weight or a volume; whether the organ is hollow -> of what a part is missed at the
-outlines of what is held, and its bound: the target of its error."""
+"""Whether a load is a motion, or weight or a volume; whether the organ is hollow -> of what a part is missed at
+outlines, and its bound: the target of its error."""
 MOVES, PACE = 1e-3, 0.02
 """Kinetic energy over the largest energy from which a run shows a motion, and bound of the error of its pace."""
 
@@ -186,7 +186,7 @@ def remarks(scene: Scene, signs: dict[str, float]) -> list[str]:
     what, bound = OUTLINES[moved, has_wall(scene)]
     if signs["missed_at_outlines"] > bound:
         lines.append(
-            f"elements are coarse where held tissue ends: the {what} may be about "
+            f"elements are coarse where held tissue or contact ends: the {what} may be about "
             f"{100 * signs['missed_at_outlines']:.2g} % off; use more nodes, or a quadratic body with graded='adaptive'"
         )
     if signs["shortened"] > SHORTENED:

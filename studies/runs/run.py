@@ -19,7 +19,7 @@ from studies.runs.current import case_fingerprint, case_path
 from studies.runs.cutting import LUMEN
 from studies.runs.indicators import indicators, remarks
 from studies.runs.limits import TIME_LIMIT
-from studies.runs.outlines import missed_at_outlines
+from studies.runs.outlines import missed_at_outlines, regions
 from studies.runs.prepare import Prepared, prepare
 from studies.runs.status import status_of
 from studies.runs.surface_frames import moments, surface_fields
@@ -79,8 +79,9 @@ def record_of(
     clock = prepared.setup.clock
     damping = prepared.setup.damping_in(clock.frames - 1)
     signs = indicators(case.scene, prepared.body, history, _lumen_column(prepared), keeps, clock.steps, damping)
-    held = prepared.setup.attachments if prepared.opening is None else ()
-    signs["missed_at_outlines"] = missed_at_outlines(prepared.body, held, history.final)
+    end, held = history.final, prepared.setup.attachments
+    places = [] if prepared.opening else regions(case.scene, prepared.body, held, end, float(history.t[-1]))
+    signs["missed_at_outlines"] = missed_at_outlines(prepared.body, places, end)
     text = "; ".join(filter(None, [_warning_text(caught), *remarks(case.scene, signs)]))
     attributes = {**_attributes(prepared, history), **signs, "warnings": text}
     return _record(case, status, message, attributes, _fields(case, prepared, history))

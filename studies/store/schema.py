@@ -150,7 +150,7 @@ class RunAttributes(Timed):
     damping_at_rest = optional_value(float, "1/s", "the same where nothing moves")
     unbalanced = optional_value(float, "1", "force at a checkpoint that moves the body, over the largest force")
     unsettled = optional_value(float, "1", "way of the body to rest at the end, over its displacement")
-    missed_at_outlines = optional_value(float, "1", "error by coarse elements where held tissue ends")
+    missed_at_outlines = optional_value(float, "1", "error by coarse elements where held tissue or contact ends")
     warnings = value(str, "", "what preparing the case warned of, and what its indicators report")
     entry = optional_value(str, "", "of an entry from outside: its file, with the SHA-256 of its positions")
     entry_seconds = optional_value(float, "s/s", "of an entry from outside: computing time for a simulated second")

@@ -12,6 +12,7 @@ from massspring import (
     Clock,
     History,
     ImplicitVolume,
+    Plane,
     Setup,
     Shake,
     Sphere,
@@ -39,11 +40,12 @@ from studies.runs.indicators import (
     unlike_neighbours,
     unsettled,
 )
-from studies.runs.outlines import missed_at_outlines
+from studies.runs.outlines import missed_at_outlines, regions
 from studies.runs.run import measure
 from studies.runs.status import shaking
 from studies.scene.library.ball_clamped import BALL_CLAMPED
 from studies.scene.library.spleen_sag import SPLEEN_SAG
+from studies.scene.library.stomach_press import STOMACH_PRESS
 from tests.massspring.conftest import SOFT, block
 from tests.massspring.quadratic import bricks, quadratic_block
 from tests.studies.tiny import SQUEEZE, tiny_case
@@ -213,13 +215,16 @@ def test_what_is_missed_at_outlines_is_the_energy_there_over_the_root_of_the_fac
     """In an even stretch each element has energy like its volume. A held face of 2 × 2 squares has eight facets."""
     body = quadratic_body(*bricks((2, 2, 2), (0.04, 0.04, 0.04)), SOFT)
     low, end = body.rest.min(axis=0), body.rest.max(axis=0)
-    held = Attachment(np.flatnonzero(body.rest[:, 2] == low[2]))
+    scene = replace(BALL_CLAMPED, obstacles=(Plane((0.0, 0.0, float(low[2])), (0.0, 0.0, 1.0)),))
+    held = np.flatnonzero(body.rest[:, 2] == low[2])
     on = (body.rest[:, 2] == low[2]) & ((body.rest == low) | (body.rest == end))[:, :2].any(axis=1)
     volumes = tetrahedron_volumes(body.rest, body.tetrahedra)
     share = volumes[on[body.tetrahedra].any(axis=1)].sum() / volumes.sum()
-    missed = missed_at_outlines(body, (held, held), body.rest * np.array([0.8, 1.25, 1.0]))
+    places, hollow = (regions(one, body, [Attachment(held)], body.rest, 0.0) for one in (scene, STOMACH_PRESS))
+    missed = missed_at_outlines(body, places, body.rest * np.array([0.8, 1.25, 1.0]))
+    assert len(hollow) == 1
     assert 0.1 < share < 0.9 and missed == pytest.approx(2.0 * share / 8**0.5)
-    assert np.isnan(missed_at_outlines(body, (), body.rest))
+    assert np.isnan(missed_at_outlines(body, [], body.rest))
 
 
 @pytest.mark.parametrize(("weight", "share"), [(0.0, 0.2), (0.1, 0.1), (0.4, 0.4)])
