@@ -14,8 +14,8 @@ ALTERNATES = 0.3
 """Bound of the alternation of pressures, over the shear modulus. Nodal volumes of pressed, clamped and sagging organs
 have 0.3 to 12, quadratic bodies 0.05 to 0.25, the most if the mesh is coarse for the gradient of the pressure."""
 SWAYS = 0.02
-"""Bound of the variation of the force, over the force: about its middle a third of the target of the force. Of runs
-that varied by 1 to 2 % all were right in a campaign; what a swing does to displacements, SWINGS bounds."""
+"""Bound of the variation of the force, over the force: about its middle a third of the target of the force. What a
+swing does to displacements, SWINGS bounds."""
 STILL_FRAMES = 20
 """Frames at the end of a run over which the variation of the force is measured."""
 VOLUME_OFF = 1e-4

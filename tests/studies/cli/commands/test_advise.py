@@ -38,7 +38,7 @@ def advise(organbench, tmp_path):
 def test_an_answer_holds_recipe_errors_cost_source_and_commands(advise, tmp_path):
     out = advise("liver_press")
     assert "liver_press: force within 3 %, displacement within 1 % (default target" in out
-    assert "adaptive quadratic, masses by stiffness, 994 surface nodes, dt = 0.8 dt_c, 2 ms" in out
+    assert "adaptive quadratic, heavy masses, 994 surface nodes, dt = 0.8 dt_c, 2 ms" in out
     assert "−1.2 ± 0.5 %" in out and "0.8 ± 0.1 %" in out
     assert "0.5 ms per 1 ms of simulated time, 2 times real time, on this machine" in out
     assert str(tmp_path / "published" / "accuracy" / "accuracy.csv") in out.replace("\n", "")

@@ -14,9 +14,9 @@ from studies.store.tables import write_table
 
 PAPER = SurfaceBody(550)
 ONE = TetrahedralBody(nodes=300)
-EVEN = QuadraticBody(594, mass="stiffness")
-GRADED = QuadraticBody(994, graded="adaptive", mass="stiffness")
-FINE = QuadraticBody(1194, graded="adaptive", mass="stiffness")
+EVEN = QuadraticBody(594, mass="heavy")
+GRADED = QuadraticBody(994, graded="adaptive", mass="heavy")
+FINE = QuadraticBody(1194, graded="adaptive", mass="heavy")
 LADDER = {
     PAPER: (-70.0, 17.0, 0.01),
     ONE: (-31.0, 5.0, 0.02),

@@ -114,7 +114,7 @@ def test_what_a_scene_does_not_compare_is_ignored_by_name(tmp_path, never_timed)
 
 def test_what_was_published_by_the_writer_of_tables_is_read_back(tmp_path, never_timed):
     """The table of a study keeps every recipe, error and time."""
-    options = {"nodes": 994, "fraction": 0.5, "frame_ms": 100.0, "recipe": {"graded": "adaptive", "mass": "stiffness"}}
+    options = {"nodes": 994, "fraction": 0.5, "frame_ms": 100.0, "recipe": {"graded": "adaptive", "mass": "heavy"}}
     runs = [run(LIVER_PRESS, "quadratic", error=0.02, **options), run(LIVER_PRESS, error=0.5, frame_ms=50.0)]
     publish(tmp_path, [])
     write_table(tmp_path / "published" / "accuracy" / "accuracy.csv", study_table(runs, ("force_end", "mean_error",
@@ -137,7 +137,7 @@ def stored_runs(monkeypatch, *runs):
     monkeypatch.setattr("studies.tools.advise.campaign.load_runs", lambda root, study: (list(runs), []))
 
 
-GRADED_RUN = {"nodes": 994, "fraction": 0.8, "frame_ms": 10.0, "recipe": {"graded": "adaptive", "mass": "stiffness"}}
+GRADED_RUN = {"nodes": 994, "fraction": 0.8, "frame_ms": 10.0, "recipe": {"graded": "adaptive", "mass": "heavy"}}
 
 
 def test_a_run_replaces_its_published_row_and_the_others_stay(results, monkeypatch, never_timed):

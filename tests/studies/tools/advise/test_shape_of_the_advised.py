@@ -40,7 +40,7 @@ def test_a_body_beyond_a_bound_of_the_shape_is_passed_over(tmp_path, shape):
 def test_the_sentence_names_what_the_body_lacks(tmp_path):
     lines = lines_of(answer(tmp_path, shaped(LIVER_PRESS, graded=(11.3, -4.0))))
     assert (
-        "not recommended: adaptive quadratic, masses by stiffness, 994 surface nodes, meets the target, but it is up "
+        "not recommended: adaptive quadratic, heavy masses, 994 surface nodes, meets the target, but it is up "
         "to 11.3 % of the liver's size away from the true shape and lacks 4 % of its volume (allowed: 1 and 0.5 %)"
         in lines
     )
