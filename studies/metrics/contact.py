@@ -6,9 +6,7 @@ from studies.geometry.surface.sides import along_facets
 from studies.meshing.bounds import FEW
 from studies.meshing.rest_surface import OUTER
 from studies.metrics.run import Run
-
-TOUCH = 1e-3
-"""Distance to an obstacle, over the size of the body, below which a point touches it."""
+from studies.runs.outlines import TOUCH
 
 
 def contact_facets(run: Run) -> float:

@@ -31,8 +31,8 @@ NAN = float("nan")
 RULE_FILE = Path(__file__).with_name("interval.json")
 RULE: dict[str, Any] = json.loads(RULE_FILE.read_text(encoding="utf-8"))
 """`seeds` of the members that it rests on and the `commit` that made it; `nodes` of their two meshes; of the force and
-the displacement under each of `load`: number of `members`, `floor` [%], and `factor` of the body with each number of
-nodes [1]; `seen`: the farthest end of each sign."""
+the displacement of each `group`: number of `members`, `floor` [%], and `factor` of the body with each number of
+nodes [1]; `loads` that they were under; `seen`: the farthest end of each sign."""
 OF_100 = 90
 
 
@@ -97,9 +97,9 @@ def second_mesh(case: Case, cases: Iterable[Case]) -> Case | None:
     return max(others, key=lambda other: other.body.nodes in RULE["nodes"], default=None)
 
 
-def load(scene: Scene) -> str:
+def group(load: str) -> str:
     """Bodies that hang have a rule of their own: at the outline by which they hang both meshes have the same error."""
-    return "weight" if load_of(scene) == "sag" else "other"
+    return "weight" if load == "sag" else "other"
 
 
 def signs(coarse: Run, fine: Run) -> dict[str, float]:
@@ -124,7 +124,7 @@ def interval(run: Run) -> Interval:
         if value > end if than == "more" else value < end:
             what = f"{words.format(f'{value:.2g}')}, {than} than any organ that the rule rests on ({end:.2g})"
             return Interval(why=f"outside: {what}")
-    rules = {name: RULE[name].get(load(run.case.scene)) for name in Apart._fields}
+    rules = {name: RULE[name].get(group(load_of(run.case.scene))) for name in Apart._fields}
     force, displacement = (
         NAN if rule is None else bound(rule, seen[name], run.case.body.nodes) for name, rule in rules.items()
     )
@@ -170,4 +170,10 @@ def words_of(run: Run) -> str:
     if displacement == displacement:
         largest = np.linalg.norm(run.fields.snapshots[-1] - run.fields.rest, axis=1).max()
         parts.append(f"displacement up to {1e3 * largest:.3g} mm ± {displacement:.2g} % in the mean")
-    return f"{', '.join(parts)} ({OF_100} of 100)"
+    return f"{', '.join(parts)} ({share_words(run.case.scene)})"
+
+
+def share_words(scene: Scene) -> str:
+    """ "90 of 100", and under which loads, if none of the members was under that of the scene."""
+    load, loads = load_of(scene), ", ".join(RULE["loads"])
+    return f"{OF_100} of 100" + (f" under {loads}; tested on none under {load}" if load not in RULE["loads"] else "")

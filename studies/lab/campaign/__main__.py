@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 
 from studies import StudyError
+from studies.base.atomic import write_whole
 from studies.catalog.accuracy import BUDGETS, FINEST
 from studies.lab.campaign.draw import MOST, member
 from studies.lab.campaign.outcome import Outcome, judge, told
@@ -74,9 +75,7 @@ def _row(number: int, title: str, bodies: list[Outcome]) -> dict[str, Any]:
 
 
 def _store(path: Path, row: dict[str, Any]) -> None:
-    new = path.with_suffix(".new")
-    new.write_text(json.dumps(row, indent=1) + "\n", encoding="utf-8")
-    os.replace(new, path)
+    write_whole(path, (json.dumps(row, indent=1) + "\n").encode())
 
 
 def table_of(rows: list[dict[str, Any]], again: str) -> tuple[str, int]:

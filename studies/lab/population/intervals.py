@@ -13,8 +13,9 @@ import pandas as pd
 
 from studies import Run, Status
 from studies.lab.commit import commit
-from studies.metrics.interval import OF_100, RULE_FILE, SIGNS, Apart, bound, load, second_mesh, signs
+from studies.metrics.interval import OF_100, RULE_FILE, SIGNS, Apart, bound, group, second_mesh, signs
 from studies.metrics.judged import DISPLACEMENT, FORCE
+from studies.scene.kind import load_of
 
 PUBLISHED, PAIRS = Path("results/published/population"), "pairs.csv"
 NODES = 1194, 1594
@@ -31,7 +32,7 @@ def pairs_of(runs: Sequence[Run]) -> pd.DataFrame:
         if other is not None and (other.body.nodes, fine.case.body.nodes) == NODES:
             coarse, scene = ended[cases.index(other)], fine.case.scene
             both = list(zip(NODES, (coarse, fine), strict=True))
-            row = {"scene": scene.name, "load": load(scene), **signs(coarse, fine)}
+            row = {"scene": scene.name, "load": load_of(scene), **signs(coarse, fine)}
             rows.append(row | {f"{name}_{n}": abs(entry(run)) for name, entry in ERRORS.items() for n, run in both})
     return pd.DataFrame(rows)
 
@@ -41,7 +42,7 @@ def rule_of(pairs: pd.DataFrame) -> dict[str, Any]:
     seen = {name: np.fmax if than == "more" else np.fmin for name, (_, than) in SIGNS.items()}  # both pass over NaN
     rule: dict[str, Any] = {"nodes": list(NODES)}
     rule["seen"] = {name: float(end.reduce(pairs[name].to_numpy(float))) for name, end in seen.items()}
-    kinds = pairs["load"].to_numpy(str)
+    rule["loads"], kinds = sorted(set(pairs["load"])), pairs["load"].map(group).to_numpy(str)
     for name in Apart._fields:
         change, rule[name] = pairs[name].to_numpy(float), {}
         for kind in sorted(set(kinds[np.isfinite(change)])):
@@ -66,7 +67,7 @@ def left_out(pairs: pd.DataFrame) -> pd.DataFrame:
     alone has its load by that of its other half (members with even numbers, and odd): how many members, the share of
     errors inside [%], the median interval, and what OF_100 of 100 errors are within [%]."""
     words = [scene.split("_") for scene in pairs["scene"]]
-    organ, kind = np.array([word[0] for word in words]), pairs["load"].to_numpy(str)
+    organ, kind = np.array([word[0] for word in words]), pairs["load"].map(group).to_numpy(str)
     half, rows = np.array([int(word[-1]) % 2 for word in words]), []
     for name in Apart._fields:
         change, error = (pairs[column].to_numpy(float) for column in (name, f"{name}_{NODES[1]}"))

@@ -176,7 +176,7 @@ def members(count, seed, organs=("liver", "kidney", "spleen"), scale=(1.0, 2.0, 
     for k in range(count * len(organs)):
         size = scale[k % len(organs)]
         change = dict(zip(("force", "displacement"), size * rng.gamma(4.0, 0.25, 2), strict=True))
-        row = {"scene": f"{organs[k % len(organs)]}_{seed}_{k // len(organs):03d}", "load": "other", **change}
+        row = {"scene": f"{organs[k % len(organs)]}_{seed}_{k // len(organs):03d}", "load": "probe", **change}
         row |= {f"{name}_{n}": abs(rng.normal()) * change[name] for name in change for n in (1194, 1594)}
         rows.append(row | {"sway": 1.0, "shape": 0.5 + 0.1 * k, "facets": 9.0 + k})
     return pd.DataFrame(rows)
@@ -191,7 +191,11 @@ def test_of_new_members_ninety_in_a_hundred_are_inside():
         for nodes in (1194, 1594):
             inside = new[f"{name}_{nodes}"] <= bound(rule[name]["other"], new[name], nodes)
             assert inside.mean() == pytest.approx(0.9, abs=0.03)
-    assert rule["seen"]["facets"] == 9.0 and rule["seen"]["shape"] == pytest.approx(0.5 + 0.1 * 899)
+    assert (
+        rule["loads"] == ["probe"]
+        and rule["seen"]["facets"] == 9.0
+        and rule["seen"]["shape"] == pytest.approx(0.5 + 0.1 * 899)
+    )
 
 
 def test_the_quantile_is_that_of_a_finite_sample():
@@ -201,7 +205,7 @@ def test_the_quantile_is_that_of_a_finite_sample():
 
 def test_an_organ_left_out_is_judged_by_the_others():
     pairs = members(60, 3)
-    pairs.loc[pairs["scene"].str.startswith("spleen"), "load"] = "weight"
+    pairs.loc[pairs["scene"].str.startswith("spleen"), "load"] = "sag"
     pairs.loc[pairs["scene"].str.startswith("kidney"), ["force_1594", "displacement_1594"]] *= 100.0
     pairs.loc[pairs["scene"].str.match("spleen.*[13579]$"), "force_1594"] *= 100.0
     table = left_out(pairs).set_index(["error", "organ"])

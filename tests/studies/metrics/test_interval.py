@@ -22,6 +22,7 @@ from studies.report.page.best import answers, best_bodies, scene_rows
 from studies.runs.current import case_path
 from studies.runs.recipes import QuadraticBody
 from studies.scene.cut import Cut
+from studies.scene.kind import load_of
 from studies.scene.library import LIVER_PROBE, SPLEEN_SAG
 from studies.store.ledger import Ledger
 from studies.store.record import Status, write_record
@@ -42,6 +43,7 @@ RULE = {
     "nodes": [1194, 1594],
     "force": {"other": OTHER},
     "displacement": {"other": OTHER, "weight": HUNG},
+    "loads": ["sag", load_of(BALL)],
     "seen": SEEN,
 }
 
@@ -92,6 +94,12 @@ def test_the_sentence_has_the_force_and_the_displacement_of_the_finest_body():
     ]
     judge = made_up_run.reference()
     assert sentences([replace(one, reference=judge) for one in runs]) == [], "where there is a reference it judges"
+
+
+def test_a_load_that_no_member_was_under_is_named(monkeypatch):
+    monkeypatch.setitem(RULE, "loads", ["fill", "probe"])
+    (sentence,) = sentences([pair()])
+    assert sentence.endswith("(90 of 100 under fill, probe; tested on none under squeeze)")
 
 
 @pytest.mark.parametrize(
