@@ -170,10 +170,10 @@ def words_of(run: Run) -> str:
     if displacement == displacement:
         largest = np.linalg.norm(run.fields.snapshots[-1] - run.fields.rest, axis=1).max()
         parts.append(f"displacement up to {1e3 * largest:.3g} mm ± {displacement:.2g} % in the mean")
-    return f"{', '.join(parts)} ({share_words(run.case.scene)})"
+    return f"{', '.join(parts)} ({OF_100} of 100{untested(run.case.scene)})"
 
 
-def share_words(scene: Scene) -> str:
-    """ "90 of 100", and under which loads, if none of the members was under that of the scene."""
-    load, loads = load_of(scene), ", ".join(RULE["loads"])
-    return f"{OF_100} of 100" + (f" under {loads}; tested on none under {load}" if load not in RULE["loads"] else "")
+def untested(scene: Scene) -> str:
+    """ "; tested on none under squeeze" if none of the members was under the load of the scene, else ""."""
+    load = load_of(scene)
+    return "" if load in RULE["loads"] else f"; tested on none under {load}"

@@ -3,7 +3,7 @@
 from studies.catalog.accuracy import ACCURACY
 from studies.meshing.bounds import SHAPE, SHAPE_VOLUME
 from studies.metrics.cells import MISSING, value_cell
-from studies.metrics.interval import share_words
+from studies.metrics.interval import OF_100, untested
 from studies.metrics.judged import Judged, Measured
 from studies.metrics.wish import Wish
 from studies.runs.case import Case
@@ -122,7 +122,8 @@ def _meshes(one: Judged, name: str) -> str:
     if not getattr(one, name).known:
         return ""
     if one.bounds:
-        return f", by two meshes without a reference ({share_words(one.case.scene)})"
+        within = f", which {OF_100} of 100 such bodies stay within, by two meshes without a reference"
+        return within + untested(one.case.scene)
     if not one.members:
         return ", on one mesh: neighbouring meshes may differ several times"
     scenes = {mesh.case.scene.name for mesh in one.members}
