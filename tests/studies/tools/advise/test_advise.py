@@ -200,6 +200,12 @@ def test_the_same_name_with_another_load_was_never_run(results):
     assert advise(replace(LIVER_PRESS, reference=None), results=results, timing=False).alike == ()
 
 
+def test_even_bodies_stand_for_their_own_organ_alone(results):
+    longer, other = like(LIVER_PRESS), like(LIVER_PRESS, organ=KIDNEY_PROBE.organ)
+    assert body(advise(longer, force=0.03, results=results, timing=False)) == EVEN
+    assert body(advise(other, force=0.03, results=results, timing=False)) == GRADED
+
+
 def test_a_scene_that_refuses_masses_by_stiffness_is_not_advised_them(tmp_path):
     lumped = replace(GRADED, mass="lumped")
     results = publish(tmp_path, rows_of(LIVER_PRESS, LADDER | {lumped: (-1.3, 0.8, 0.9)}))
