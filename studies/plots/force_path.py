@@ -34,8 +34,8 @@ from studies.runs.recipes import BodyRecipe
 from studies.scene.scene import Scene
 from studies.store.schema import COMPARABLE
 
-TITLE = "Force against the reference"
-CUT_TITLE = "Force on the end that is moved, of a body that is cut, against the reference"
+TITLE, AGAINST = "Force", " against the reference"
+CUT_TITLE = "Force on the end that is moved, of a body that is cut"
 FORCES = [metric for metric in METRICS if metric.name == "force_end"]
 """Metrics that are written at the ends of the lines."""
 ROOM = 1.06
@@ -53,14 +53,17 @@ def figure(runs: Sequence[Run]) -> Figure:
     sheet, axes = panel_grid(len(scenes), 2, (5.2, 3.0), (0.0, 0.4))
     for panel, group in zip(axes.flat, scenes.values(), strict=False):
         _draw_scene(panel, group, looks)
-    reference = reference_handle(linestyle="-", linewidth=1)
-    handles = [*body_method_handles(shown, looks), reference, band_handle("± its uncertainty")]
+    handles, against = body_method_handles(shown, looks), ""
+    if any(group[0].reference is not None for group in scenes.values()):
+        handles += [reference_handle(linestyle="-", linewidth=1), band_handle("± its uncertainty")]
+        against = AGAINST
     cut = any(run.case.scene.cuts for run in shown)
     dotted = "the cut, and the end of the motion" if cut else "the motion ends"
-    notes = [f"At the end of each line: its error there, once everything is at rest. Dotted: {dotted}."]
+    number = "error there" if against else "force there"
+    notes = [f"At the end of each line: its {number}, once everything is at rest. Dotted: {dotted}."]
     return finish(
         sheet,
-        CUT_TITLE if cut else TITLE,
+        (CUT_TITLE + "," * bool(against) if cut else TITLE) + against,
         handles,
         [*notes, *unresolved_notes(shown, FORCES), *remarks(runs)],
         columns=3,

@@ -35,7 +35,7 @@ JUDGED, UNIFORM, ADVISED = "run FILE.py", "uniform", "advised"
 random size; the one that `advise` recommends."""
 BAR, FAR = 1.0 / 3.0, 3.0
 """Over the target: largest bar of a reference that judges, and error beyond which a body is far off."""
-ELSEWHERE = "frames take longer", "the motion is", "on the way"
+ELSEWHERE = "frames take longer", "the motion is", "on the way", "no heavier than its tissue"
 """Parts of sentences on cost and on the way: they do not doubt the end, where a member is judged."""
 
 

@@ -1,5 +1,6 @@
 """What charts say: numbers where they belong, never below the floor, doubtful ones marked; costs, limits, names."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -69,6 +70,11 @@ def test_force_of_the_reference_holds_when_the_press_stops():
     assert np.interp([stop, 4.0], path.get_xdata(), path.get_ydata()) == pytest.approx([4.0, 4.0])
     assert list(marks.get_xdata()) == list(BALL_SQUEEZE.checkpoints)
     assert "−25 %" in words(force_path.figure([run(error=0.25)]))
+
+
+def test_a_chart_without_a_reference_does_not_name_one():
+    alone = replace(run(), reference=None)
+    assert "reference" in words(force_path.figure([run()])) and "reference" not in words(force_path.figure([alone]))
 
 
 def test_runs_that_did_not_end_ok_are_struck_out_and_named():
