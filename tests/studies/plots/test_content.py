@@ -74,7 +74,8 @@ def test_force_of_the_reference_holds_when_the_press_stops():
 
 def test_a_chart_without_a_reference_does_not_name_one():
     alone = replace(run(), reference=None)
-    assert "reference" in words(force_path.figure([run()])) and "reference" not in words(force_path.figure([alone]))
+    for name in ("against the reference", "reference (finite elements)"):
+        assert name in words(force_path.figure([run()])) and name not in words(force_path.figure([alone]))
 
 
 def test_runs_that_did_not_end_ok_are_struck_out_and_named():
