@@ -19,6 +19,8 @@ UNCONVERGED_NOTE = (
     f"{UNCONVERGED_MARK} not converged: the answer depends on the step and on the order of elements, which ± does not "
     "contain"
 )
+UNTESTED_MARK = "‖"
+UNTESTED_NOTE = f"{UNTESTED_MARK} no organ on which the rule of the 90 of 100 rests was under such a load"
 MISSED_MARK = "*"
 MISSED_NOTE = (
     f"{MISSED_MARK} misses the target: force within {SOLID[0]:g} %, mean displacement within {SOLID[1]:g} % (hollow "

@@ -34,6 +34,8 @@ RULE: dict[str, Any] = json.loads(RULE_FILE.read_text(encoding="utf-8"))
 the displacement of each `group`: number of `members`, `floor` [%], and `factor` of the body with each number of
 nodes [1]; `loads` that they were under; `seen`: the farthest end of each sign."""
 OF_100 = 90
+WITHIN = "force_within", "mean_within"
+"""The metrics that an interval gives."""
 
 
 class Apart(NamedTuple):
@@ -170,10 +172,10 @@ def words_of(run: Run) -> str:
     if displacement == displacement:
         largest = np.linalg.norm(run.fields.snapshots[-1] - run.fields.rest, axis=1).max()
         parts.append(f"displacement up to {1e3 * largest:.3g} mm ± {displacement:.2g} % in the mean")
-    return f"{', '.join(parts)} ({OF_100} of 100{untested(run.case.scene)})"
+    return f"{', '.join(parts)} ({'; '.join(filter(None, (f'{OF_100} of 100', untested(run.case.scene))))})"
 
 
 def untested(scene: Scene) -> str:
-    """ "; tested on none under squeeze" if none of the members was under the load of the scene, else ""."""
+    """ "tested on none under squeeze" if none of the members was under the load of the scene, else ""."""
     load = load_of(scene)
-    return "" if load in RULE["loads"] else f"; tested on none under {load}"
+    return "" if load in RULE["loads"] else f"tested on none under {load}"

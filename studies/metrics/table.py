@@ -18,8 +18,11 @@ from studies.metrics.cells import (
     UNCONVERGED_MARK,
     UNCONVERGED_NOTE,
     UNRESOLVED_NOTE,
+    UNTESTED_MARK,
+    UNTESTED_NOTE,
 )
 from studies.metrics.contact import few_facets
+from studies.metrics.interval import WITHIN, untested
 from studies.metrics.metric import Metric
 from studies.metrics.metrics import METRICS
 from studies.metrics.run import Run
@@ -40,11 +43,13 @@ MISSES = "misses"
 """Column with the metrics that miss the default target of the scene, or a bound of the shape."""
 FEW_FACETS = "few facets"
 """Column that says whether a sphere or capsule touches fewer than eight facets."""
+UNTESTED = "untested"
+"""Column that says under which load of the scene the rule of its intervals was not tested."""
 DISTURBED, PROCESSOR = "disturbed", "processor"
 """Columns of a table with times: why these are not those of the program alone, and the processor that they are of."""
-MARKS = {UNCONVERGED: UNCONVERGED_MARK, FEW_FACETS: FEW_MARK, DISTURBED: DISTURBED_MARK}
+MARKS = {UNCONVERGED: UNCONVERGED_MARK, FEW_FACETS: FEW_MARK, UNTESTED: UNTESTED_MARK, DISTURBED: DISTURBED_MARK}
 NOTES = {MISSES: MISSED_NOTE, UNRESOLVED: UNRESOLVED_NOTE, FEW_FACETS: FEW_NOTE, UNCONVERGED: UNCONVERGED_NOTE}
-NOTES |= {DISTURBED: DISTURBED_NOTE}
+NOTES |= {UNTESTED: UNTESTED_NOTE, DISTURBED: DISTURBED_NOTE}
 """Columns -> the mark of a row with something there, and what a table says of it."""
 
 
@@ -114,6 +119,8 @@ def row_of(run: Run, metrics: Sequence[Metric]) -> Row:
         row[f"{entry.name} [{entry.unit}]"] = entry(run)
         row[f"{entry.name} floor [{entry.unit}]"] = entry.uncertainty(run)
     row[FEW_FACETS] = few_facets(run)
+    within = [row[f"{entry.name} [{entry.unit}]"] for entry in metrics if entry.name in WITHIN]
+    row[UNTESTED] = untested(case.scene) if any(value == value for value in within) else ""
     timing = run.timing if any(entry.spread is not None for entry in metrics) else None
     row[DISTURBED], row[PROCESSOR] = ("", "") if timing is None else (timing.disturbed, timing.processor)
     row[UNRESOLVED] = " ".join(entry.name for entry in metrics if entry.unresolved(run))

@@ -1,25 +1,26 @@
 """`python -m studies.lab.silicone [SCENE]`: measured silicone predicted by both solvers, as tables and a chart.
 
-beam_release: ten minutes; `--programs` lets other programs release the beam and puts their rows into the table that is
-there. cylinder_press: ten minutes, with `--curves` half a minute; `--data` takes other cylinders of the same size.
+beam_release: ten minutes; cylinder_press: ten minutes, with `--curves` half a minute; `--data` takes other cylinders of
+the same size. `--programs` lets other programs release the beam, and puts their rows into the table that is there, or
+press the cylinder between bonded plates.
 """
 
 import argparse
 import sys
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import pandas as pd
 
 from studies import StudyError
-from studies.lab.league.programs import PROGRAMS, Surroundings
+from studies.lab.league.programs import PROGRAMS, Program, Surroundings
 from studies.lab.silicone import press
 from studies.lab.silicone.chart import Point, figure, press_figure
 from studies.lab.silicone.cylinder import MOONEY, curves, sticking_moduli
 from studies.lab.silicone.measured import LOADS
 from studies.lab.silicone.predict import FINE, bars, fitted_youngs, predicted, read_table, write_table
-from studies.lab.silicone.programs import LIMIT, program_row
+from studies.lab.silicone.programs import LIMIT, press_rows, program_row
 from studies.plots.style.style import save
 
 
@@ -37,7 +38,8 @@ def main() -> None:
     asked = parser.parse_args()
     table = asked.results / "silicone" / "silicone.csv"
     table.parent.mkdir(parents=True, exist_ok=True)
-    if asked.scene == "cylinder_press":
+    programs = [one for one in PROGRAMS if asked.only in (None, one.name)]
+    if asked.scene == "cylinder_press" and not asked.programs:
         try:
             judge_presses(press.read_runs(asked.data), asked.curves, table.with_name)
         except (OSError, StudyError) as problem:
@@ -47,7 +49,10 @@ def main() -> None:
     if asked.programs:
         with tempfile.TemporaryDirectory() as folder:
             at = Surroundings(Path(folder), asked.environments or asked.results / "cache" / "environments", LIMIT)
-            release(table, asked.only, asked.youngs or fitted_youngs(FINE), at)
+            if asked.scene == "cylinder_press":
+                write(pd.DataFrame(press_rows(programs, at)), table.with_name("press_programs.csv"))
+                return
+            release(table, programs, asked.youngs or fitted_youngs(FINE), at)
     else:
         rows = []
         for row in predicted():
@@ -84,11 +89,11 @@ def say(row: Point) -> None:
     print(f"{row.who}, {row.newton:g} N: {row.sag:.2f} mm, {row.frequency:.3f} Hz, {row.damping:.4f}", flush=True)
 
 
-def release(table: Path, only: str | None, youngs: float, at: Surroundings) -> None:
+def release(table: Path, programs: Sequence[Program], youngs: float, at: Surroundings) -> None:
     """Puts the rows of programs into the table in place of those that they have there; what fails is reported on
     standard error."""
     rows = read_table(table)
-    for program in (one for one in PROGRAMS if only in (None, one.name)):
+    for program in programs:
         for load in LOADS:
             try:
                 row = program_row(program, load, youngs, at)

@@ -14,6 +14,7 @@ from scipy.interpolate import CubicSpline
 from skfem import Basis, ElementTetP2, ElementVector, MeshTet
 
 from massspring import (
+    Attachment,
     ImplicitVolume,
     Material,
     Plane,
@@ -41,7 +42,8 @@ SECONDS, DAMPING, SHARE = 2.0, 60.0, 0.8
 FOLDED = 0.1
 """Least J below which a body counts as folded, as for the status of a run (docs/results.md)."""
 REFERENCE, COARSER, MOONEY, YEOH = "reference", "reference, coarser mesh", "Mooney-Rivlin", "Yeoh"
-Slip = Literal["no_slip", "frictionless"]
+Slip = Literal["no_slip", "frictionless", "bonded"]
+"""How ends meet plates; bonded ends are plates, and sides do not fold onto them."""
 
 
 @dataclass(frozen=True)
@@ -50,7 +52,7 @@ class Contestant:
 
     name: str
     cells: tuple[int, int]
-    friction: float | Literal["no_slip"] = "no_slip"
+    friction: float | Literal["no_slip", "bonded"] = "no_slip"
     mixed: bool = False
     """Whether elements at the plates keep their own volume."""
 
@@ -85,14 +87,19 @@ def eighth(cells: tuple[int, int], radius: float = RADIUS, height: float = HEIGH
     return upright(np.column_stack([x * round_off, y * round_off, 0.5 * height * z]), box.t.T.astype(np.int64))
 
 
-def whole(cells: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
-    """Points (n, 3) [m] and quadratic tetrahedra (k, 10) of eight mirrored eighths, with round sides."""
+def eighths(cells: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
+    """Points (n, 3) [m] and tetrahedra (k, 4) of eight mirrored eighths."""
     points, corners = eighth(cells)
     signs = list(itertools.product((1.0, -1.0), repeat=3))
     every = np.concatenate([points * sign for sign in signs])
     _, first, one = np.unique(every.round(9) + 0.0, axis=0, return_index=True, return_inverse=True)
     numbers = one.ravel()[np.concatenate([corners + k * len(points) for k in range(8)])]
-    points, nodes = second_order(*upright(every[first], numbers))
+    return upright(every[first], numbers)
+
+
+def whole(cells: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
+    """Points (n, 3) [m] and quadratic tetrahedra (k, 10) of the cylinder, with round sides."""
+    points, nodes = second_order(*eighths(cells))
     outside = np.hypot(*points[:, :2].T) > RADIUS - 1e-9
     middles, ends = nodes[:, 4:], outside[nodes[:, EDGES]].all(axis=2)
     bent = np.unique(middles[ends])
@@ -122,8 +129,16 @@ def reference_curves(
     )
     basis = Basis(mesh, ElementVector(ElementTetP2()), intorder=5)
     held = [PrescribedDisplacement(lambda x, c=c: np.abs(x[c]) < 1e-9, (c,)) for c in range(3)]
-    plate = RigidPlane((0.0, 0.0, 0.5 * height), (0.0, 0.0, -1.0), lambda t: (0.0, 0.0, -0.5 * height * t), slip)
-    path = equilibrium_path(Problem(mesh, NeoHookean(1.0, BULK), held, (plate,)), at)
+
+    def way(t: float) -> tuple[float, float, float]:
+        return 0.0, 0.0, -0.5 * height * t
+
+    plates: tuple[RigidPlane, ...] = ()
+    if slip == "bonded":
+        held.append(PrescribedDisplacement(lambda x: np.abs(x[2] - 0.5 * height) < 1e-9, motion=way))
+    else:
+        plates = (RigidPlane((0.0, 0.0, 0.5 * height), (0.0, 0.0, -1.0), way, slip),)
+    path = equilibrium_path(Problem(mesh, NeoHookean(1.0, BULK), held, plates), at)
     energies = []
     for state in path:
         u = np.zeros(basis.N)
@@ -137,7 +152,8 @@ def reference_curves(
         energies.append([0.5 * (basis.dx * w).sum() / basis.dx.sum() for w in (I2 - I1, (I1 - 3.0) ** 2)])
     ends: Any = ((1, [0.0, 0.0]), "not-a-knot")
     slopes = CubicSpline(np.append(0.0, at), np.vstack([[0.0, 0.0], energies]), bc_type=ends)
-    force = np.array([-state.obstacle_force[0, 2] for state in path]) / (0.25 * np.pi * radius**2)
+    pushes = [state.obstacle_force[0] if plates else state.held_force[-1] for state in path]
+    force = -np.array(pushes)[:, 2] / (0.25 * np.pi * radius**2)
     more = slopes(at, 1).T
     return force / sliding(at), more[0] / sliding(at), more[1] / sliding(at)
 
@@ -149,23 +165,21 @@ def body_curve(contestant: Contestant, at: np.ndarray) -> np.ndarray:
     touched = np.abs(points[:, 2]) > 0.5 * HEIGHT - 1e-9
     own = np.logical_and(contestant.mixed, touched[nodes].any(axis=1))
     body = quadratic_body(points, nodes, Material(MODULUS, DENSITY), inertia="stiffness", own_volumes=own)
-    way = 0.5 * END * HEIGHT
-    plates = tuple(
-        Plane(
-            (0.0, 0.0, sign * 0.5 * HEIGHT),
-            (0.0, 0.0, -sign),
-            Trajectory((0.0, SECONDS), ((0.0, 0.0, 0.0), (0.0, 0.0, -sign * way))),
-            contestant.friction,
-        )
-        for sign in (1.0, -1.0)
-    )
+    plates, ends, way = list[Plane](), list[Attachment](), 0.5 * END * HEIGHT
+    for sign in (1.0, -1.0):
+        path = Trajectory((0.0, SECONDS), ((0.0, 0.0, 0.0), (0.0, 0.0, -sign * way)))
+        if contestant.friction == "bonded":
+            ends.append(Attachment(np.flatnonzero(sign * points[:, 2] > 0.5 * HEIGHT - 1e-9), path))
+        else:
+            plates.append(Plane((0.0, 0.0, sign * 0.5 * HEIGHT), (0.0, 0.0, -sign), path, contestant.friction))
     limit = step_limit(body, DAMPING)
     clock = make_clock(SECONDS, 4 * MOMENTS, SHARE * limit.damped, limit)
-    history = simulate(Setup(body, ImplicitVolume(), clock, plates, damping=DAMPING))
+    history = simulate(Setup(body, ImplicitVolume(), clock, tuple(plates), tuple(ends), damping=DAMPING))
     if history.outcome != "finished":
         raise StudyError(f"{contestant.name}: {history.message}")
     compression = END * history.t / SECONDS
-    force = 0.5 * (history.contact_force[:, 1, 2] - history.contact_force[:, 0, 2]) / (MODULUS * np.pi * RADIUS**2)
+    push = (history.held_force if ends else history.contact_force)[:, :, 2]
+    force = 0.5 * (push[:, 1] - push[:, 0]) / (MODULUS * np.pi * RADIUS**2)
     force[np.minimum.accumulate(history.min_j) < FOLDED] = np.nan
     return np.interp(at, compression, force / sliding(compression))
 

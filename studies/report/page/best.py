@@ -8,7 +8,7 @@ from studies.base.counting import counted, readable
 from studies.exchange.entry import sides_of
 from studies.meshing.bounds import REFERENCE_SHAPE, SHAPE, SHAPE_VOLUME, enough
 from studies.metrics.cells import DISTURBED_MARK, MISSING, plain, value_cell
-from studies.metrics.interval import OF_100
+from studies.metrics.interval import OF_100, untested
 from studies.metrics.judged import Judged, Measured, by_cost
 from studies.metrics.run import Run
 from studies.metrics.table import DISTURBED, OFF_SHAPE, PROCESSOR
@@ -97,6 +97,7 @@ def _row(one: Judged, number: str, words: str = "") -> Best:
     }
     words = words or f"{body_words(one.case.body)}, {one.case.dt_fraction:g}"
     row = {"body": words, "case": number, "meshes": max(1, len(one.members)), "bounds": one.bounds, **pairs}
+    row["untested"] = untested(one.case.scene) if one.bounds else ""
     return row | {DISTURBED: bool(one.disturbed), PROCESSOR: one.processor}
 
 
@@ -217,7 +218,9 @@ def _errors(rows: Sequence[Best]) -> str:
 
 def _errors_of(rows: Sequence[Best]) -> str:
     force, displacement, shape = (_span(rows, name) for name in ("force", "displacement", "shape"))
+    none = "; ".join(dict.fromkeys(words for row in rows if (words := row.get("untested"))))
     most = f" at most in {OF_100} of 100 such bodies" if any(row.get("bounds") for row in rows) else ""
+    most += f" ({none})" if none else ""
     words = {
         f"force off by {force} %{most}": force,
         f"mean displacement error {displacement} %{most}": displacement,

@@ -123,7 +123,7 @@ def _meshes(one: Judged, name: str) -> str:
         return ""
     if one.bounds:
         within = f", which {OF_100} of 100 such bodies stay within, by two meshes without a reference"
-        return within + untested(one.case.scene)
+        return "; ".join(filter(None, (within, untested(one.case.scene))))
     if not one.members:
         return ", on one mesh: neighbouring meshes may differ several times"
     scenes = {mesh.case.scene.name for mesh in one.members}

@@ -21,10 +21,13 @@ from skfem import (
 
 from massspring import Material, quadratic_body
 from studies import StudyError
+from studies.lab.league.adapters.scene_folder import SceneFolder, hand_in
+from studies.lab.league.programs import Program, Surroundings
 from studies.lab.silicone import __main__ as command
-from studies.lab.silicone import press
+from studies.lab.silicone import press, programs
 from studies.lab.silicone.cylinder import (
     HEIGHT,
+    MODULUS,
     MOONEY,
     RADIUS,
     Contestant,
@@ -86,6 +89,39 @@ def test_the_body_is_round():
         np.pi * RADIUS**2 * HEIGHT, rel=2e-3
     )
     assert np.hypot(*points[:, :2].T).max() == pytest.approx(RADIUS, rel=1e-12)
+
+
+def test_bonded_ends_are_plates_until_sides_fold_onto_them():
+    at = np.array([0.02, 0.3])
+    bonded, sticks = (reference_curves((4, 3), at, slip)[0] for slip in ("bonded", "no_slip"))
+    assert bonded[0] == pytest.approx(sticks[0], rel=1e-3) and bonded[1] < 0.98 * sticks[1]
+    assert body_curve(Contestant("", (3, 3), "bonded"), at)[1] == pytest.approx(bonded[1], rel=0.03)
+
+
+@pytest.mark.parametrize("mesh", programs.CELLS)
+def test_a_program_gets_the_cylinder_and_is_judged_by_the_force_on_top(mesh, tmp_path, monkeypatch):
+    def hand_over(program, given, out, at):
+        """A program with twice the force at 40 %, from the scene that it gets."""
+        scene = SceneFolder(given, program.mesh)
+        scene.check_simple()
+        corners = scene.points[scene.cells[:, :4]]
+        volume = np.linalg.det(corners[:, 1:] - corners[:, :1]).sum() / 6.0
+        assert volume == pytest.approx(np.pi * RADIUS**2 * HEIGHT, rel=0.06) and scene.mu == MODULUS
+        top = scene.points[scene.probed_nodes]
+        assert np.allclose(top[:, 2], 0.5 * HEIGHT) and len(scene.held) == 2 * len(top)
+        closed = np.ptp(scene.held_at(scene.times[-1])[:, 2])
+        assert closed == pytest.approx((1.0 - programs.PRESSED[-1]) * HEIGHT)
+        factors = reference_curves((2, 2), np.array(programs.PRESSED), "bonded")[0] * [1.0, 1.0, 1.0, 2.0]
+        force = factors * sliding(np.array(programs.PRESSED)) * MODULUS * np.pi * RADIUS**2
+        hand_in(out, scene.times, np.array([scene.points] * 5), np.append(0.0, force), 3.0)
+        return "", ""
+
+    monkeypatch.setattr(programs, "hand_over", hand_over)
+    monkeypatch.setattr(programs, "reference_curves", lambda cells, at, slip: reference_curves((2, 2), at, slip))
+    monkeypatch.setattr(programs, "CELLS", dict.fromkeys(programs.CELLS, (2, 2)))
+    ours, other = programs.press_rows([Program("other", "", mesh)], Surroundings(tmp_path, tmp_path))
+    assert other["cost [s/s]"] == 3.0 and other["at 40 % [%]"] == pytest.approx(100.0)
+    assert other["at 20 % [%]"] == pytest.approx(0.0, abs=1e-6) and abs(ours["at 20 % [%]"]) < 10.0
 
 
 @pytest.fixture

@@ -13,10 +13,11 @@ from studies.catalog.of_scene import study_of
 from studies.geometry import HalfSpace
 from studies.meshing.true_surface import ShapeErrors
 from studies.metrics import interval as module
+from studies.metrics.cells import UNTESTED_MARK
 from studies.metrics.interval import RULE_FILE, Apart, apart, interval, second_mesh, sentences
 from studies.metrics.judged import UNKNOWN, cheapest, judged
 from studies.metrics.metrics import force_within
-from studies.metrics.table import metric
+from studies.metrics.table import marked, metric, row_of
 from studies.metrics.wish import Wish
 from studies.report.page.best import answers, best_bodies, scene_rows
 from studies.runs.current import case_path
@@ -99,7 +100,12 @@ def test_the_sentence_has_the_force_and_the_displacement_of_the_finest_body():
 def test_a_load_that_no_member_was_under_is_named(monkeypatch):
     monkeypatch.setitem(RULE, "loads", ["fill", "probe"])
     (sentence,) = sentences([pair()])
-    assert sentence.endswith("(90 of 100; tested on none under squeeze)")
+    words, run = "tested on none under squeeze", pair()
+    assert sentence.endswith(f"(90 of 100; {words})")
+    run.__dict__["shape"] = ShapeErrors(0.001, 0.0)
+    assert f"90 of 100 such bodies ({words})" in answers(best_bodies([run], lambda one: "it"))["How wrong?"]
+    marks = [marked(row_of(run, [metric(name)])) for name in ("force_within", "mean_error")]
+    assert [UNTESTED_MARK in mark for mark in marks] == [True, False]
 
 
 @pytest.mark.parametrize(
