@@ -28,15 +28,17 @@ class EnergyAccount:
     """Energy of a body during a stage, and the work on it: of obstacles, attachments, gravity and fills, and the energy
     at the start. Damping and friction take energy, so that energy − work only falls.
 
-    The work is NaN for a method that does not keep volumes as constraints: it stores energy in other ways too.
+    A volume that is within its tolerance but not on its target has been moved there by its pressure, which does work,
+    too. The work is NaN for a method that does not keep volumes as constraints: it stores energy in other ways too.
     """
 
     def __init__(self, setup: Setup, state: State, frame: int = 0) -> None:
         self.setup, self.frame = setup, frame
         self.rest_energy = setup.body.rest_energy
+        self.unmet = 0.0
         self._look(state, setup.body.measured(state.x.astype(np.float64, copy=False)))
         constrained = setup.method.capabilities.correction in ("limited", "full")
-        self.work = self.energy if constrained else np.nan
+        self.done = self.energy if constrained else np.nan
         self.force, self.pressure_at_end = np.zeros((len(setup.obstacles) + len(setup.attachments), 3)), self.pressure
 
     def add(self, state: State, measured: Measured, steps: int) -> None:
@@ -54,15 +56,21 @@ class EnergyAccount:
         begin, end = self.setup.paths(times)
         self._look(state, measured)
         self.pressure_at_end = self.pressure + (self.pressure - pressure) / steps
-        self.work += float(done.work[0]) + float(((self.force + 0.5 * (self.force - force)) * (end - begin)).sum())
-        self.work += float(0.5 * (ended + self.pressure_at_end) @ (self.target - target)) + self.fallen - fallen
+        self.done += float(done.work[0]) + float(((self.force + 0.5 * (self.force - force)) * (end - begin)).sum())
+        self.done += float(0.5 * (ended + self.pressure_at_end) @ (self.target - target)) + self.fallen - fallen
+        self.unmet = float(self.pressure_at_end @ (measured.volume - self.target))
 
     def entered(self, setup: Setup, state: State) -> "EnergyAccount":
         """That of the stage after an event, whose change of energy counts as work."""
         after = EnergyAccount(setup, state, self.frame)
-        after.work += self.work - self.energy
+        after.done += self.done - self.energy
         after.force = self.force
         return after
+
+    @property
+    def work(self) -> float:
+        """On the body, from where it was at rest [J]."""
+        return self.done + self.unmet
 
     @property
     def energy(self) -> float:

@@ -49,14 +49,13 @@ LEAST_CHANGE = 1e-4
 
 @njit_inlined
 def change_of_pressures(rows, rest_lam):
-    """Mean of |lam_r − lam_r at rest| [Pa] of the volumes that something can push. Under a small tool few of them change
-    much: their root mean square would be far above what most of them feel."""
+    """Root mean square of lam_r − lam_r at rest [Pa] of the volumes that something can push."""
     total, count = 0.0, 0
     for r in range(rest_lam.shape[0]):
         if rows.diagonal[r] > 0.0:
-            total += abs(rows.lam[r] - rest_lam[r])
+            total += (rows.lam[r] - rest_lam[r]) ** 2
             count += 1
-    return max(total / max(count, 1), LEAST_CHANGE * rows.rest_pressure)
+    return max(math.sqrt(total / max(count, 1)), LEAST_CHANGE * rows.rest_pressure)
 
 
 @njit_lean

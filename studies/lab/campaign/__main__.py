@@ -1,6 +1,7 @@
 """`python -m studies.lab.campaign --seed N --scenes K --results DIR`: trust, measured on K random scenes of a seed.
 
-What was interrupted continues. Exit code 1: a body is silent and far off.
+What was interrupted continues. pairs.csv is for studies.lab.population.intervals. Exit code 1: a body is silent and far
+off.
 """
 
 import argparse
@@ -19,12 +20,13 @@ from typing import Any
 
 import numpy as np
 
-from studies import StudyError
+from studies import Scene, StudyError
 from studies.base.atomic import write_whole
 from studies.catalog.accuracy import BUDGETS, FINEST
 from studies.lab.campaign.draw import MOST, member
-from studies.lab.campaign.outcome import Outcome, judge, told
+from studies.lab.campaign.outcome import JUDGED, Outcome, judge, told, two_meshes
 from studies.lab.commit import commit
+from studies.lab.population.intervals import PAIRS, pairs_of
 
 CELLS = [f"{told}, {truth}" for told in ("silent", "doubted") for truth in ("right", "wrong", "far", "undecided")]
 FINE, WORST_FIRST = ("silent, right", "doubted, right", "not ok", "refused"), [*CELLS, "crashed"]
@@ -54,12 +56,10 @@ def _run(part: Path, seed: int, number: int, scans: list[Path], most: float, sec
     resource.setrlimit(resource.RLIMIT_CPU, (math.ceil(seconds), resource.RLIM_INFINITY))
     part.unlink(missing_ok=True)
     try:
-        scene = member(seed, number, scans)
+        scene = _scene(seed, number, scans, most)
     except StudyError as error:
         print(f"member {number} is skipped: {error}", flush=True)
         return
-    assert scene.reference is not None  # a member has a plan
-    scene = replace(scene, reference=replace(scene.reference, most=most))
     print(f"{number}: {scene.title}", flush=True)
     nodes = int(np.random.default_rng([seed, number, 1]).choice([*BUDGETS, FINEST]))
     _store(part, _row(number, scene.title, []))
@@ -67,6 +67,12 @@ def _run(part: Path, seed: int, number: int, scans: list[Path], most: float, sec
     _store(part, _row(number, scene.title, [one for one, _ in ended]))
     fault = judge(part.parent, scene, ended)
     _store(part, _row(number, scene.title, [one for one, _ in ended]) | {"fault": fault})
+
+
+def _scene(seed: int, number: int, scans: list[Path], most: float) -> Scene:
+    scene = member(seed, number, scans)
+    assert scene.reference is not None  # a member has a plan
+    return replace(scene, reference=replace(scene.reference, most=most))
 
 
 def _row(number: int, title: str, bodies: list[Outcome]) -> dict[str, Any]:
@@ -126,6 +132,9 @@ def main(words: list[str]) -> int:
     options += f" --scans {given.scans}" if given.scans else ""
     text, far = table_of(rows, f"{parser.prog} {options} --member")
     print(text)
+    ended = (row["member"] for row in rows if any(one["way"] == JUDGED and one["errors"] for one in row["bodies"]))
+    runs = [run for number in ended for run in two_meshes(root, _scene(given.seed, number, scans, given.most))]
+    pairs_of(runs).to_csv(root / PAIRS, index=False, float_format="%.4g")
     return int(far > 0)
 
 

@@ -16,6 +16,7 @@ from studies import (
     Status,
     StudyError,
     measure,
+    read_record,
     recommended,
     solve_reference,
 )
@@ -25,6 +26,7 @@ from studies.metrics.contact import few_facets
 from studies.metrics.interval import apart, interval
 from studies.metrics.judged import DISPLACEMENT, FORCE
 from studies.metrics.wish import usual_wish
+from studies.reference.load import load_reference
 from studies.runs.current import case_path
 from studies.runs.indicators import remarks
 from studies.scene.checks import check_scene
@@ -137,6 +139,19 @@ def _ended(
     one.doubts = [words for words in (*odd, warnings.strip("; "), "few facets" * few_facets(run)) if words]
     one.signs |= {entry.name: value for entry in METRICS if math.isfinite(value := entry(run))}
     return one, run
+
+
+def two_meshes(root: Path, scene: Scene) -> list[Run]:
+    """The bodies of `organbench run FILE.py` on its two meshes and the reference that judges them; none where one is
+    not stored below `root`."""
+    cases = study_of(replace(scene, reference=None)).cases[-2:]
+    try:
+        reference = load_reference(root, scene)
+        records = [read_record(case_path(root, scene.name, case)) for case in cases]
+    except (StudyError, OSError):
+        return []
+    judged = reference if reference is not None and not reference.warnings else None
+    return [Run(replace(case, scene=scene), record, judged) for case, record in zip(cases, records, strict=True)]
 
 
 def judge(root: Path, scene: Scene, ended: Ended) -> str:

@@ -1,5 +1,8 @@
-"""`python -m studies.lab.population.intervals`: the rule of studies.metrics.interval by the published members, and
-intervals.md, how it does on organs that it has not seen; with a FOLDER by the members in FOLDER/pairs.csv."""
+"""`python -m studies.lab.population.intervals [FOLDER [PAIRS.csv ...]]`: the rule of studies.metrics.interval by the
+members in FOLDER/pairs.csv, default the published ones, and intervals.md, how it does on organs that it has not seen.
+
+Members of other files, those of campaigns, are added to FOLDER/pairs.csv.
+"""
 
 import json
 import math
@@ -15,16 +18,20 @@ from studies import Run, Status
 from studies.lab.commit import commit
 from studies.metrics.interval import OF_100, RULE_FILE, SIGNS, Apart, bound, group, second_mesh, signs
 from studies.metrics.judged import DISPLACEMENT, FORCE
+from studies.metrics.wish import usual_wish
 from studies.scene.kind import load_of
 
 PUBLISHED, PAIRS = Path("results/published/population"), "pairs.csv"
 NODES = 1194, 1594
 """Of the two meshes of `organbench run FILE.py`."""
 ERRORS = dict(zip(Apart._fields, (FORCE, DISPLACEMENT), strict=True))
+BAR = 1.0 / 3.0
+"""Largest uncertainty of a reference that judges, over the target of the scene."""
 
 
 def pairs_of(runs: Sequence[Run]) -> pd.DataFrame:
-    """A row for each member whose two adaptive meshes ended well and have a reference: SIGNS, and |errors| [%]."""
+    """A row for each member whose two adaptive meshes ended well and have a reference: SIGNS, and |errors| [%], with
+    NaN for the change and the errors that the reference does not decide."""
     ended = [run for run in runs if run.reference is not None and run.record.status == Status.OK]
     cases, rows = [run.case for run in ended], list[dict[str, Any]]()
     for fine in ended:
@@ -32,8 +39,13 @@ def pairs_of(runs: Sequence[Run]) -> pd.DataFrame:
         if other is not None and (other.body.nodes, fine.case.body.nodes) == NODES:
             coarse, scene = ended[cases.index(other)], fine.case.scene
             both = list(zip(NODES, (coarse, fine), strict=True))
-            row = {"scene": scene.name, "load": load_of(scene), **signs(coarse, fine)}
-            rows.append(row | {f"{name}_{n}": abs(entry(run)) for name, entry in ERRORS.items() for n, run in both})
+            organ = "scan" if scene.organ.shape == "file" else scene.organ.shape
+            row = {"scene": scene.name, "organ": organ, "load": load_of(scene), **signs(coarse, fine)}
+            for name, entry in ERRORS.items():
+                decided = entry.uncertainty(fine) <= BAR * getattr(usual_wish(scene), name)
+                row |= {f"{name}_{n}": abs(entry(run)) if decided else math.nan for n, run in both}
+                row[name] = row[name] if decided else math.nan
+            rows.append(row)
     return pd.DataFrame(rows)
 
 
@@ -66,9 +78,8 @@ def left_out(pairs: pd.DataFrame) -> pd.DataFrame:
     """Intervals of the finer mesh of the members of each organ by the rule that the other organs give, of an organ that
     alone has its load by that of its other half (members with even numbers, and odd): how many members, the share of
     errors inside [%], the median interval, and what OF_100 of 100 errors are within [%]."""
-    words = [scene.split("_") for scene in pairs["scene"]]
-    organ, kind = np.array([word[0] for word in words]), pairs["load"].map(group).to_numpy(str)
-    half, rows = np.array([int(word[-1]) % 2 for word in words]), []
+    organ, kind = pairs["organ"].to_numpy(str), pairs["load"].map(group).to_numpy(str)
+    half, rows = pairs["scene"].str.split("_").str[-1].astype(int).to_numpy() % 2, []
     for name in Apart._fields:
         change, error = (pairs[column].to_numpy(float) for column in (name, f"{name}_{NODES[1]}"))
         known, width = np.isfinite(change), np.full(len(pairs), np.nan)
@@ -97,8 +108,9 @@ def intervals_of(pairs: pd.DataFrame) -> str:
     return "\n".join(lines)
 
 
-def main(folder: Path = PUBLISHED) -> None:
-    pairs = pd.read_csv(folder / PAIRS)
+def main(folder: Path = PUBLISHED, *others: Path) -> None:
+    pairs = pd.concat(map(pd.read_csv, (folder / PAIRS, *others))).drop_duplicates("scene", keep="last")
+    pairs.to_csv(folder / PAIRS, index=False)
     seeds = sorted(set(pairs["scene"].str.split("_").str[-2].astype(int)))
     rule = {"seeds": seeds, "commit": commit(), **rule_of(pairs)}
     RULE_FILE.write_text(json.dumps(rule, indent=2) + "\n", encoding="utf-8")
