@@ -50,7 +50,7 @@ def main() -> None:
         with tempfile.TemporaryDirectory() as folder:
             at = Surroundings(Path(folder), asked.environments or asked.results / "cache" / "environments", LIMIT)
             if asked.scene == "cylinder_press":
-                write(pd.DataFrame(press_rows(programs, at)), table.with_name("press_programs.csv"))
+                press_by(programs, table.with_name("press_programs.csv"), at)
                 return
             release(table, programs, asked.youngs or fitted_youngs(FINE), at)
     else:
@@ -78,6 +78,13 @@ def judge_presses(runs: list[press.Run], known: Path | None, place: Callable[[st
     }
     spread = press.scatter(found[0].rows, stick)
     save(press_figure(table, press.over_sliding(runs, stick), spread, shown), place("press.png"))
+
+
+def press_by(programs: Sequence[Program], path: Path, at: Surroundings) -> None:
+    """Puts the rows of programs, and of our body, into the table in place of those that they have there."""
+    rows = pd.DataFrame(press_rows(programs, at))
+    there = [pd.read_csv(path)] if path.is_file() else []
+    write(pd.concat([*there, rows]).drop_duplicates("who", keep="last"), path)
 
 
 def write(table: pd.DataFrame, path: Path) -> None:

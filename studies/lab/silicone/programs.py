@@ -3,6 +3,7 @@ as a folder, as it gets a scene."""
 
 import json
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -38,7 +39,9 @@ STEPS: dict[str, dict[str, Any]] = {"mujoco": {"step": 2e-4}, "newton": {"step":
 LIMIT = 1800.0
 """Of a run [s]."""
 CELLS = {"straight": FINE, "curved": (3, 3)}
-"""Bricks of an eighth of the cylinder: 1,000 nodes of linear elements, 2,200 of quadratic ones."""
+"""Bricks of an eighth of the cylinder: 1,089 nodes of linear elements, 2,197 of quadratic ones."""
+QUADRATIC = "felupe", "sfepy"
+"""Programs with quadratic elements; the second on straight ones."""
 PRESSED, PRESS = (0.1, 0.2, 0.3, 0.4), 4.0
 """Compressions that are judged, and time to the last [s]: the cylinder's inertia is 1e-4 of the force."""
 SLOW = 10.0
@@ -94,9 +97,9 @@ def write_beam(folder: Path, beam: Beam, youngs: float, load: Load, damping: flo
     )
 
 
-def write_cylinder(folder: Path, mesh: str) -> None:
+def write_cylinder(folder: Path, mesh: str, bricks: tuple[int, int]) -> None:
     """The cylinder between bonded plates that close by the last of PRESSED."""
-    points, cells = whole(CELLS[mesh]) if mesh == "curved" else eighths(CELLS[mesh])
+    points, cells = whole(bricks) if mesh == "curved" else eighths(bricks)
     way, held = 0.5 * PRESSED[-1] * HEIGHT, {}
     for name, sign in (("top", 1.0), ("bottom", -1.0)):
         path = {"times": [0.0, PRESS], "displacements": [[0.0, 0.0, 0.0], [0.0, 0.0, -sign * way]]}
@@ -139,11 +142,11 @@ def press_rows(programs: Sequence[Program], at: Surroundings) -> Iterator[dict[s
     own = np.interp(moments, known, body_curve(ours, known))
     yield row(ours.name, len(whole(ours.cells)[0]), np.nan, own)
     for program in programs:
-        given, out = at.folder / f"cylinder-{program.mesh}", at.folder / f"{program.name}.npz"
-        if not given.exists():
-            write_cylinder(given, program.mesh)
+        given, out = at.folder / f"cylinder-{program.name}", at.folder / f"{program.name}.npz"
+        write_cylinder(given, program.mesh, CELLS["curved" if program.name in QUADRATIC else program.mesh])
+        settings = dict(program.settings) | STEPS.get(program.name, {})
         try:
-            arrays = arrays_of(program, given, out, at)
+            arrays = arrays_of(replace(program, settings=settings), given, out, at)
         except StudyError as problem:
             yield {"who": program.name, "message": str(problem)}
             continue
@@ -157,7 +160,6 @@ def program_row(program: Program, load: Load, youngs: float, at: Surroundings) -
     given, out = at.folder / load.name.replace(" ", "_"), at.folder / f"{program.name}.npz"
     write_beam(given, MESH, youngs, load, fitted_damping(), DURATION)
     settings = dict(program.settings) | STEPS.get(program.name, {})
-    contender = Program(program.name, program.adapter, "straight", program.packages, settings, absent=program.absent)
-    arrays = arrays_of(contender, given, out, at)
+    arrays = arrays_of(replace(program, mesh="straight", settings=settings), given, out, at)
     swing = swing_of(arrays["t"], marker_sag(arrays["positions"][0], arrays["positions"]).mean(axis=1))
     return Point(program.name, load.newton, 1e3 * swing.sag, swing.frequency, swing.damping)
