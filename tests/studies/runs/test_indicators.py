@@ -23,6 +23,7 @@ from massspring import (
     tetrahedral_body,
 )
 from studies.geometry.mesh.organ_mesh import tetrahedron_volumes
+from studies.metrics.wish import SOLID
 from studies.runs.indicators import (
     FEEDS,
     SHAKES,
@@ -92,6 +93,10 @@ def history(force=np.ones_like, good_frames=50, pressure=None, kinetic=0.0, work
 def swaying(scene, made) -> float:
     """Of the good frames of a history."""
     return sway(scene, made.t[: made.good_frames], made.contact_force, made.held_force)
+
+
+def test_a_force_sways_about_its_middle_by_a_third_of_its_target_at_most():
+    assert pytest.approx(SOLID[0] / 3.0) == 100.0 * SWAYS / 2.0
 
 
 def test_a_trend_is_no_sway_but_a_swing_is():
