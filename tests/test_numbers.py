@@ -432,6 +432,10 @@ ROWS = [
     *((SILICONE, f"| {shape:.2f} | #, #, #, # | # |",
         lambda n=n: rows("silicone", "press_modulus").iloc[n, 1:].tolist())
       for n, shape in enumerate(rows("silicone", "press_modulus").iloc[:, 0])),
+    *((SILICONE, f"| {who} | # | #, #, #, # |", lambda who=who: [
+        of(rows("silicone", "press_programs"), who=who)[column].item()
+        for column in ("nodes", *(f"at {c} % [%]" for c in (10, 20, 30, 40)))])
+      for who in rows("silicone", "press_programs").dropna(subset="nodes")["who"]),
     (SILICONE, "nodes are at most # % off from 4 to 40 % compression, mixed ones # %", lambda: (
         pressed("a volume per vertex", "a volume per vertex, finer mesh"), pressed("mixed volumes"))),
     (LIMITS, "with volumes of vertices are within # % from 4 to 40 %", lambda: (pressed("a volume per vertex"),)),

@@ -63,7 +63,7 @@ def headline_case(scene: Scene) -> Case:
 def even(scene: Scene) -> tuple[BodyRecipe, ...]:
     """Quadratic bodies with elements of one size: the smallest, which is fast; all where grading changes nothing."""
     sizes = BUDGETS[:1] if graded(scene) else BUDGETS
-    return tuple(QuadraticBody(nodes, mass=_mass(scene)) for nodes in sizes)
+    return tuple(QuadraticBody(nodes, mass=usual_mass(scene)) for nodes in sizes)
 
 
 def graded(scene: Scene) -> tuple[BodyRecipe, ...]:
@@ -72,7 +72,7 @@ def graded(scene: Scene) -> tuple[BodyRecipe, ...]:
     if not is_adaptive(scene) and not can_be_graded(scene):
         return ()
     way = ADAPTIVE if is_adaptive(scene) else True
-    return tuple(QuadraticBody(nodes, graded=way, mass=_mass(scene)) for nodes in BUDGETS[1:])
+    return tuple(QuadraticBody(nodes, graded=way, mass=usual_mass(scene)) for nodes in BUDGETS[1:])
 
 
 def mixed(scene: Scene) -> tuple[BodyRecipe, ...]:
@@ -80,8 +80,8 @@ def mixed(scene: Scene) -> tuple[BodyRecipe, ...]:
     in two sizes, and adaptive; none where nothing is held."""
     if not scene.held:
         return ()
-    even = [QuadraticBody(size, mass=_mass(scene), volumes="mixed") for size in BUDGETS[:2]]
-    fine = QuadraticBody(BUDGETS[1], graded=ADAPTIVE, mass=_mass(scene), volumes="mixed")
+    even = [QuadraticBody(size, mass=usual_mass(scene), volumes="mixed") for size in BUDGETS[:2]]
+    fine = QuadraticBody(BUDGETS[1], graded=ADAPTIVE, mass=usual_mass(scene), volumes="mixed")
     return (*even, fine) if is_adaptive(scene) else tuple(even)
 
 
@@ -117,7 +117,7 @@ def element_cases(scene: Scene) -> tuple[Case, ...]:
     return (explicit, *implicit)
 
 
-def _mass(scene: Scene) -> Literal["lumped", "stiffness", "heavy"]:
+def usual_mass(scene: Scene) -> Literal["lumped", "stiffness", "heavy"]:
     """The masses that allow the longest step. Hollow organs swing too slowly for loads of seconds to be heavier."""
     if why_inertia_matters(scene):
         return "lumped"

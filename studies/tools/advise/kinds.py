@@ -3,11 +3,14 @@
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
-from studies.base.errors import DoesNotApply
+from studies.base.errors import DoesNotApply, StudyError
+from studies.catalog.accuracy import usual_mass
 from studies.metrics.judged import UNKNOWN, Judged, Measured
 from studies.runs.case import Case
 from studies.runs.quadratic import check_masses
 from studies.runs.recipe_text import recipe_text
+from studies.runs.recipes import QuadraticBody
+from studies.scene.inertia import why_inertia_matters
 from studies.scene.kind import kind_of
 from studies.scene.scene import Scene
 
@@ -16,33 +19,48 @@ NUMBERS = ("force", "displacement", "cost", "shape", "shape_volume")
 
 
 def same_kind(scene: Scene, scenes: Iterable[Scene]) -> list[Scene]:
-    """Those of `scenes` that are as hollow as `scene` and loaded in the same way."""
-    kind = kind_of(scene)
-    return [other for other in scenes if kind_of(other) == kind]
+    """Those of `scenes` that are as hollow as `scene`, loaded in the same way, and held if it is."""
+    kind = kind_of(scene), bool(scene.held)
+    return [other for other in scenes if (kind_of(other), bool(other.held)) == kind]
 
 
 def worst_of(scene: Scene, groups: Sequence[Sequence[Judged]]) -> list[Judged]:
     """The recipes that ended well in all `groups`, one for each scene, as cases of `scene` with their largest errors
-    and costs; without those that the scene refuses. The step is not known before the body is made.
+    and costs; without those that the scene refuses. The step is not known before the body is made. Raises StudyError
+    where none is left.
 
-    Even quadratic bodies do not stand for another organ: on random scenes 13 of 19 of them missed the target by more
-    than the reference's uncertainty, of 22 adaptive ones 2, which said so (docs/population.md).
+    For another organ only quadratic bodies with smaller elements where the scene needs them: on random scenes 13 of 19
+    with elements of one size missed the target by more than the reference's uncertainty, of 22 adaptive ones 2, which
+    said so (docs/population.md). Masses by stiffness and heavy ones end alike, and are those that suit `scene`.
     """
-    by_recipe = [{recipe_text(one.case): one for one in group} for group in groups]
+    by_recipe = [{recipe_text(_in_scene(scene, one.case)): one for one in group} for group in groups]
     common = [text for text in by_recipe[0] if all(text in group for group in by_recipe)]
     recipes = []
     for text in common:
         same = [group[text] for group in by_recipe]
-        case = same[0].case.replaced(scene=scene)
-        other_organ = any(one.case.scene.organ != scene.organ for one in same)
-        if _refused(scene, case) or (other_organ and case.body.kind == "quadratic" and not case.body.graded):
+        case, other_organ = _in_scene(scene, same[0].case), any(one.case.scene.organ != scene.organ for one in same)
+        if _refused(scene, case) or (other_organ and not case.body.graded):
             continue
         force, displacement, cost, shape, volume = (_largest([getattr(one, name) for one in same]) for name in NUMBERS)
         meshes = tuple(mesh for one in same for mesh in one.members)
         disturbed = next((one.disturbed for one in same if one.disturbed), "")
         worst = Judged(case, force, displacement, cost, disturbed=disturbed, shape=shape, shape_volume=volume)
         recipes.append(replace(worst, members=meshes))
+    if not recipes:
+        why = why_inertia_matters(scene) or "none of their bodies has smaller elements where the scene needs them"
+        raise StudyError(
+            f"no results apply to scene '{scene.name}': those of scenes of its kind ({kind_of(scene)}) do not hold for "
+            f"it: {why}; `organbench run FILE.py` runs it on two meshes"
+        )
     return recipes
+
+
+def _in_scene(scene: Scene, case: Case) -> Case:
+    """The recipe of a case in another scene, with the masses that suit it where neither has those of the tissue."""
+    body, usual = case.body, usual_mass(scene)
+    if isinstance(body, QuadraticBody) and "lumped" not in (body.mass, usual):
+        body = replace(body, mass=usual)
+    return case.replaced(scene=scene, body=body)
 
 
 def _largest(values: Sequence[Measured]) -> Measured:

@@ -13,6 +13,7 @@ from studies.metrics.wish import usual_wish
 from studies.runs.recipes import BodyRecipe, neighbours
 from studies.scene.library import (
     BALL_CLAMPED,
+    BALL_SQUEEZE,
     BLADDER_FILL,
     KIDNEY_PROBE,
     LIVER_PRESS,
@@ -204,6 +205,22 @@ def test_even_bodies_stand_for_their_own_organ_alone(results):
     longer, other = like(LIVER_PRESS), like(LIVER_PRESS, organ=KIDNEY_PROBE.organ)
     assert body(advise(longer, force=0.03, results=results, timing=False)) == EVEN
     assert body(advise(other, force=0.03, results=results, timing=False)) == GRADED
+
+
+def test_masses_that_end_alike_are_one_recipe_and_a_free_organ_does_not_stand_for_a_held_one(tmp_path, never_timed):
+    light = {replace(one, mass="stiffness") if one.kind == "quadratic" else one: n for one, n in LADDER.items()}
+    rows = [*rows_of(LIVER_PROBE), *rows_of(KIDNEY_PROBE, light), *rows_of(BALL_CLAMPED), *rows_of(BALL_SQUEEZE)]
+    results = publish(tmp_path, rows)
+    assert body(advise(like(LIVER_PROBE, organ=BALL_CLAMPED.organ), results=results, timing=False)) == GRADED
+    squeezed = like(BALL_CLAMPED, organ=KIDNEY_PROBE.organ)
+    assert advise(squeezed, results=results, timing=False).alike == ("ball_clamped",)
+
+
+def test_a_scene_whose_motion_matters_gets_no_results_of_slow_ones(results):
+    (plane,) = LIVER_PRESS.obstacles
+    fast = replace(plane, path=replace(plane.path, times=(0.0, 0.1)))
+    with pytest.raises(StudyError, match=r"no results apply .* .solid, press.* moves at .* mm/s.*run FILE.py"):
+        advise(like(LIVER_PRESS, organ=KIDNEY_PROBE.organ, obstacles=(fast,)), results=results, timing=False)
 
 
 def test_a_scene_that_refuses_masses_by_stiffness_is_not_advised_them(tmp_path):

@@ -49,7 +49,7 @@ def test_of_a_heavy_body_the_lighter_one_is_told_as_that(no_tables, tmp_path):
     light, heavy = (replace(CASE, body=replace(CASE.body, mass=mass)) for mass in ("stiffness", "heavy"))
     table(tmp_path / "population" / "population.csv", light)
     assert unseen(tmp_path, heavy).force == unseen(tmp_path, light).force
-    assert "(liver, masses by stiffness, 1 more failed)" in words(unseen(tmp_path, heavy))
+    assert "(liver, under a probe, masses by stiffness, 1 more failed)" in words(unseen(tmp_path, heavy))
     assert "masses" not in words(unseen(tmp_path, light))
 
 
