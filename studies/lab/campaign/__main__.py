@@ -134,7 +134,8 @@ def main(words: list[str]) -> int:
     print(text)
     ended = (row["member"] for row in rows if any(one["way"] == JUDGED and one["errors"] for one in row["bodies"]))
     runs = [run for number in ended for run in two_meshes(root, _scene(given.seed, number, scans, given.most))]
-    pairs_of(runs).to_csv(root / PAIRS, index=False, float_format="%.4g")
+    if runs:
+        pairs_of(runs).to_csv(root / PAIRS, index=False, float_format="%.4g")
     return int(far > 0)
 
 

@@ -1,6 +1,7 @@
 """What a user is told of a body in a scene, and whether it is right."""
 
 import math
+import re
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -37,8 +38,10 @@ JUDGED, UNIFORM, ADVISED = "run FILE.py", "uniform", "advised"
 random size; the one that `advise` recommends."""
 BAR, FAR = 1.0 / 3.0, 3.0
 """Over the target: largest bar of a reference that judges, and error beyond which a body is far off."""
-ELSEWHERE = "frames take longer", "the motion is", "on the way", "no heavier than its tissue"
+ELSEWHERE = "frames take longer", "the motion is", "on the way"
 """Parts of sentences on cost and on the way: they do not doubt the end, where a member is judged."""
+NO_HEAVIER = re.compile(r"mass='heavy' makes the body no heavier than its tissue: [^;]*")
+"""A warning on cost, too."""
 
 
 @dataclass
@@ -133,7 +136,7 @@ def _ended(
         return one, None
     run = Run(case, record)
     one.signs = {name: value for name, value in record.attributes.items() if isinstance(value, int | float)}
-    warnings = str(record.attributes["warnings"])
+    warnings = NO_HEAVIER.sub("", str(record.attributes["warnings"]))
     for sentence in remarks(scene, one.signs):
         warnings = warnings.replace(sentence, "") if any(part in sentence for part in ELSEWHERE) else warnings
     one.doubts = [words for words in (*odd, warnings.strip("; "), "few facets" * few_facets(run)) if words]

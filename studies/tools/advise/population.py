@@ -132,7 +132,7 @@ def _of(rows: pd.DataFrame, entry: Metric) -> Distribution:
 
 
 def words(sample: Unseen) -> str:
-    """ "on 40 other organs (liver, under a probe) the median force error is 1.2 %, 95 % are below 8 % (6 to 12), ..."."""
+    """ "on 40 other organs (liver, under a probe) the median force error is 1.2 %, 95 % are below 8 %, ..."."""
 
     def bound(name: str, one: Distribution) -> str:
         low, high = one.bound_interval

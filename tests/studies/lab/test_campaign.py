@@ -4,6 +4,7 @@ interrupted continues."""
 import os
 import signal
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -72,6 +73,8 @@ def test_truth(force, mean, truth):
         ("ok", {}, "silent"),
         ("ok", {"shortened": 3.0, "pace": 1.3, "unbalanced": 0.1}, "silent"),
         ("ok", {"pace": 1.3, "sway": 0.03}, "doubted"),
+        ("ok", {"also": ["mass='heavy' makes the body no heavier than its tissue: its weight"]}, "silent"),
+        ("ok", {"also": ["mass='heavy' makes the body no heavier than its tissue: it swings", "odd"]}, "doubted"),
         ("folded", {}, "not ok"),
         ("timed-out", {}, "not ok"),
         ("failed", {}, "refused"),
@@ -85,13 +88,24 @@ def test_what_a_user_is_told(told, signs, answer, tmp_path, monkeypatch):
         if isinstance(told, Exception):
             raise told
         attributes = ATTRIBUTES | SOUND | signs
-        warnings = "; ".join(remarks(SCENE, attributes))
+        warnings = "; ".join([*remarks(SCENE, attributes), *attributes.pop("also", [])])
         return replace(run().record, status=told, attributes=attributes | {"warnings": warnings})
 
     monkeypatch.setattr(outcome, "measure", measured)
     monkeypatch.setattr(outcome, "check_scene", lambda scene: [])
     one = outcome._ended(tmp_path, "", lambda: run().case, SCENE, {})[0]
     assert one.kind.split(",")[0] == answer, one.message
+
+
+def test_the_two_meshes_of_a_member_are_judged_unless_its_reference_is_doubted(tmp_path, monkeypatch):
+    assert outcome.two_meshes(tmp_path, SCENE) == []
+    judge, asked = SimpleNamespace(warnings=""), []
+    monkeypatch.setattr(outcome, "load_reference", lambda root, scene: judge)
+    monkeypatch.setattr(outcome, "read_record", lambda path: asked.append(path) or run().record)
+    assert [one.reference for one in outcome.two_meshes(tmp_path, SCENE)] == [judge, judge]
+    assert [path.name.split("-")[2] for path in asked] == ["1194", "1594"]
+    judge.warnings = "off the shape"
+    assert [one.reference for one in outcome.two_meshes(tmp_path, SCENE)] == [None, None]
 
 
 def test_what_was_interrupted_continues_and_a_silent_body_that_is_far_off_fails(tmp_path, monkeypatch, capfd):

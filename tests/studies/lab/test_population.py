@@ -1,6 +1,7 @@
 """Members of a population: who they are does not depend on how many there are, each can be palpated, and tables count
 them right."""
 
+import itertools
 import json
 import math
 from dataclasses import replace
@@ -163,11 +164,18 @@ def test_a_rigid_motion_explains_itself_and_nothing_of_a_strain():
 @pytest.mark.usefixtures("_flat_facets")
 def test_pairs_have_what_two_meshes_show_and_the_errors_of_both():
     runs = [made(0, FINE), made(0, COARSE, shifted, force=2.2), made(1, FINE), made(2, COARSE, status=Status.FOLDED)]
-    (row,) = pairs_of([*runs, made(2, FINE), made(3, FINE), made(3, replace(COARSE, nodes=994))]).to_dict("records")
+    runs += [made(2, FINE), made(3, FINE), made(3, replace(COARSE, nodes=994))]
+    for one, bar in itertools.product(runs, ("force", "surface_mean", "force_end")):
+        one.reference.total_uncertainty[bar] = 0.0033
+    (row,) = pairs_of(runs).to_dict("records")
     assert row["scene"] == "liver_0_000" and row["force"] == pytest.approx(10.0) and row["sway"] == 4.0
     assert (row["force_1194"], row["force_1594"]) == pytest.approx((10.0, 0.0), abs=1e-9)
     largest = np.linalg.norm(bend(POINTS), axis=1).max()
     assert row["displacement_1194"] == pytest.approx(row["displacement"]) == pytest.approx(100 * 6e-3 / largest)
+    runs[0].reference.total_uncertainty["force_end"] = 0.011
+    (row,) = pairs_of(runs).to_dict("records")
+    unknown = [name for name, value in row.items() if name.startswith("force") and value != value]
+    assert unknown == ["force", "force_1194", "force_1594"], "a reference that does not decide has no errors"
 
 
 def members(count, seed, organs=("liver", "kidney", "spleen"), scale=(1.0, 2.0, 0.5)):
@@ -176,7 +184,8 @@ def members(count, seed, organs=("liver", "kidney", "spleen"), scale=(1.0, 2.0, 
     for k in range(count * len(organs)):
         size = scale[k % len(organs)]
         change = dict(zip(("force", "displacement"), size * rng.gamma(4.0, 0.25, 2), strict=True))
-        row = {"scene": f"{organs[k % len(organs)]}_{seed}_{k // len(organs):03d}", "load": "probe", **change}
+        organ = organs[k % len(organs)]
+        row = {"scene": f"{organ}_{seed}_{k // len(organs):03d}", "organ": organ, "load": "probe", **change}
         row |= {f"{name}_{n}": abs(rng.normal()) * change[name] for name in change for n in (1194, 1594)}
         rows.append(row | {"sway": 1.0, "shape": 0.5 + 0.1 * k, "facets": 9.0 + k})
     return pd.DataFrame(rows)
