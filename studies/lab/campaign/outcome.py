@@ -19,6 +19,7 @@ from studies import (
     measure,
     read_record,
     recommended,
+    reference_for,
     solve_reference,
 )
 from studies.catalog.accuracy import LONG, even
@@ -27,7 +28,6 @@ from studies.metrics.contact import few_facets
 from studies.metrics.interval import apart, interval
 from studies.metrics.judged import DISPLACEMENT, FORCE
 from studies.metrics.wish import usual_wish
-from studies.reference.load import load_reference
 from studies.runs.current import case_path
 from studies.runs.indicators import remarks
 from studies.scene.checks import check_scene
@@ -149,7 +149,7 @@ def two_meshes(root: Path, scene: Scene) -> list[Run]:
     not stored below `root`."""
     cases = study_of(replace(scene, reference=None)).cases[-2:]
     try:
-        reference = load_reference(root, scene)
+        reference = reference_for(root, scene)
         records = [read_record(case_path(root, scene.name, case)) for case in cases]
     except (StudyError, OSError):
         return []

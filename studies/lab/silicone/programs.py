@@ -55,9 +55,9 @@ def write_scene(
 ) -> None:
     """An exported scene with one mesh, `rest` in its description; held: name -> which points, and their path."""
     mesh = "straight" if cells.shape[1] == 4 else "curved"
-    marks = {"outer": np.ones(len(points), int)} | {
-        f"held_{one}": which.astype(int) for one, (which, _) in held.items()
-    }
+    marks: dict[str, Any] = {"outer": np.ones(len(points), int)}
+    for one, (which, _) in held.items():
+        marks[f"held_{one}"] = which.astype(int)
     folder.mkdir(parents=True, exist_ok=True)
     meshio.write(folder / f"{mesh}.vtu", meshio.Mesh(points, {TETRAHEDRA[cells.shape[1]]: cells}, marks))
     data = {

@@ -100,7 +100,7 @@ def test_what_a_user_is_told(told, signs, answer, tmp_path, monkeypatch):
 def test_the_two_meshes_of_a_member_are_judged_unless_its_reference_is_doubted(tmp_path, monkeypatch):
     assert outcome.two_meshes(tmp_path, SCENE) == []
     judge, asked = SimpleNamespace(warnings=""), []
-    monkeypatch.setattr(outcome, "load_reference", lambda root, scene: judge)
+    monkeypatch.setattr(outcome, "reference_for", lambda root, scene: judge)
     monkeypatch.setattr(outcome, "read_record", lambda path: asked.append(path) or run().record)
     assert [one.reference for one in outcome.two_meshes(tmp_path, SCENE)] == [judge, judge]
     assert [path.name.split("-")[2] for path in asked] == ["1194", "1594"]
