@@ -6,6 +6,7 @@ import numpy as np
 
 from reference_fem.contact import augmented as contact
 from reference_fem.contact.faces import Faces, FaceTouch, add_faces, coincident, no_faces
+from reference_fem.contact.inside import Inside
 from reference_fem.elements.shapes import Facets, build_elements, build_facets, nodes
 from reference_fem.elements.surface import Surface
 from reference_fem.errors import SolveError
@@ -75,6 +76,7 @@ class System:
         self.loaded = self.find_loads()
         start = self.obstacles_at(settings.start)
         checks.check_start(self.surface, start, checks.boundary_size(mesh))
+        self.inside = Inside(self.surface, start)
         self.solver = SymmetricSolver(settings.solver)
 
     def check_freedom(self, held_dofs: np.ndarray):
