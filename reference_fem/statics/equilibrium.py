@@ -118,7 +118,7 @@ def advance(system: System, state: State, t: float, load: float, path: Sequence[
         goal = min(1.0, reached + share)
         there = t if goal == 1.0 else t0 + goal * (t - t0)
         try:
-            state = outside(system, solve_step(system, state, there, load0 + goal * (load - load0)))
+            state = solve_step(system, state, there, load0 + goal * (load - load0))
         except StepFailed as failure:
             share = 0.5 * (goal - reached)
             if share < system.settings.smallest_step:
@@ -128,15 +128,6 @@ def advance(system: System, state: State, t: float, load: float, path: Sequence[
         if state.iterations <= EASY:
             share *= 2.0
     return state, iterations, substeps
-
-
-def outside(system: System, state: State) -> State:
-    """The same state. Raises StepFailed where an obstacle has slipped through the surface: a smaller step keeps it
-    out, if the facets are small enough for it."""
-    slipped = system.inside.first(system.obstacles_at(state.t), state.x)
-    if slipped is not None:
-        raise StepFailed(f"obstacle {slipped} slips through the surface, whose facets may be too large for it")
-    return state
 
 
 def stuck(state: State, t: float, failure: Exception, path: Sequence[Equilibrium]):

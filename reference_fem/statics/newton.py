@@ -40,6 +40,14 @@ class StepFailed(Exception):
     """A load step did not converge; the path tries a smaller one."""
 
 
+def check_outside(system: System, x: np.ndarray, rows: np.ndarray):
+    """Raises StepFailed where an obstacle has slipped through the surface: a smaller step keeps it out, if the facets
+    are small enough for it."""
+    slipped = system.inside.first(rows, x)
+    if slipped is not None:
+        raise StepFailed(f"obstacle {slipped} slips through the surface, whose facets may be too large for it")
+
+
 def solve_step(system: System, state: State, t: float, load: float, more: np.ndarray | float = 0.0) -> State:
     """The equilibrium at time t from the one in `state`; raises StepFailed.
 
@@ -64,6 +72,7 @@ def solve_step(system: System, state: State, t: float, load: float, more: np.nda
         off, last = distance > allowed, evaluation
         if arrived and settled(evaluation, system.settings, LOOSE if off else 1.0):
             if not off:
+                check_outside(system, x, loads.rows)
                 hold = contact.renewed_grip(evaluation.touch, system.sticks, system.surface, x)
                 settled_in = State(t, load, x, loads.multiplier, evaluation.touch.pressure, iteration)
                 settled_in = replace(settled_in, faces=loads.faces, face_pressure=evaluation.faces.pressure)

@@ -47,7 +47,7 @@ def worst_of(scene: Scene, groups: Sequence[Sequence[Judged]]) -> list[Judged]:
         worst = Judged(case, force, displacement, cost, disturbed=disturbed, shape=shape, shape_volume=volume)
         recipes.append(replace(worst, members=meshes))
     if not recipes:
-        why = why_inertia_matters(scene) or "none of their bodies has smaller elements where the scene needs them"
+        why = why_inertia_matters(scene) or "they share no body with smaller elements where a scene needs them"
         raise StudyError(
             f"no results apply to scene '{scene.name}': those of scenes of its kind ({kind_of(scene)}) do not hold for "
             f"it: {why}; `organbench run FILE.py` runs it on two meshes"
