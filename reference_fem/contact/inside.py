@@ -6,10 +6,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from reference_fem.elements.surface import Surface
-from reference_fem.model.obstacles import PLANE
-
-ALONG = np.linspace(0.0, 1.0, 5)
-"""Where the axis of a capsule is looked at."""
+from reference_fem.model.obstacles import CAPSULE, PLANE
 
 
 class Inside:
@@ -21,24 +18,25 @@ class Inside:
         ends, count = self.corners[:, [0, 1, 0, 2]].reshape(-1, 2), len(self.rest)
         links = coo_array((np.ones(len(ends)), (ends[:, 0], ends[:, 1])), (count, count))
         self.sheet = connected_components(links, directed=False)[1][self.corners[:, 0]]
-        around = self._around(rows, self.rest)
-        self.watched = [k for k, row in enumerate(rows) if row[0] != PLANE and not around[k]]
+        corners = self.rest[self.corners]
+        self.watched = [k for k, row in enumerate(rows) if row[0] != PLANE and not self._holds(row, corners)]
 
     def first(self, rows: np.ndarray, x: np.ndarray) -> int | None:
         """The first obstacle that was outside all sheets at the start and is inside one now; x: unknowns [m]."""
         if not self.watched:
             return None
-        around = self._around(rows[self.watched], self.rest + x[: self.rest.size].reshape(-1, 3))
-        return next((k for k, inside in zip(self.watched, around, strict=True) if inside), None)
+        corners = (self.rest + x[: self.rest.size].reshape(-1, 3))[self.corners]
+        return next((k for k in self.watched if self._holds(rows[k], corners)), None)
 
-    def _around(self, rows: np.ndarray, positions: np.ndarray) -> list[bool]:
-        """Of each obstacle whether a sheet of the surface surrounds a point of its middle."""
-        triangles = positions[self.corners]
-        return [any(self._surrounded(row[1:4] + s * row[4:7], triangles) for s in ALONG) for row in rows]
+    def _holds(self, row: np.ndarray, corners: np.ndarray) -> bool:
+        """Whether a sheet with the triangles `corners` (nf, 3, 3) surrounds the middle of a sphere, or a point of a
+        capsule's axis; these are no farther apart than its radius."""
+        count = 2 + int(np.linalg.norm(row[4:7]) / row[7]) if row[0] == CAPSULE else 1
+        return any(self._surrounded(row[1:4] + s * row[4:7], corners) for s in np.linspace(0.0, 1.0, count))
 
-    def _surrounded(self, point: np.ndarray, triangles: np.ndarray) -> bool:
+    def _surrounded(self, point: np.ndarray, corners: np.ndarray) -> bool:
         """By solid angles (Van Oosterom and Strackee 1983, doi:10.1109/TBME.1983.325207)."""
-        a, b, c = (triangles - point).transpose(1, 0, 2)
+        a, b, c = (corners - point).transpose(1, 0, 2)
         la, lb, lc = (np.linalg.norm(v, axis=1) for v in (a, b, c))
         volume = np.einsum("fi,fi->f", a, np.cross(b, c))
         dots = [np.einsum("fi,fi->f", v, w) * length for v, w, length in ((a, b, lc), (a, c, lb), (b, c, la))]

@@ -24,6 +24,7 @@ from studies import (
 )
 from studies.catalog.accuracy import LONG, even
 from studies.catalog.of_scene import study_of
+from studies.lab.population.intervals import BAR
 from studies.metrics.contact import few_facets
 from studies.metrics.interval import apart, interval
 from studies.metrics.judged import DISPLACEMENT, FORCE
@@ -36,8 +37,8 @@ from studies.store.record import write_record
 JUDGED, UNIFORM, ADVISED = "run FILE.py", "uniform", "advised"
 """Ways to a body: the finer of the two meshes of `organbench run FILE.py`, which the coarser one judges; uniform with a
 random size; the one that `advise` recommends."""
-BAR, FAR = 1.0 / 3.0, 3.0
-"""Over the target: largest bar of a reference that judges, and error beyond which a body is far off."""
+FAR = 3.0
+"""Error over the target beyond which a body is far off."""
 ELSEWHERE = "frames take longer", "the motion is", "on the way"
 """Parts of sentences on cost and on the way: they do not doubt the end, where a member is judged."""
 NO_HEAVIER = re.compile(r"mass='heavy' makes the body no heavier than its tissue: [^;]*")

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from typing import Literal
 
 from studies.base.errors import DoesNotApply, StudyError
 from studies.catalog.accuracy import usual_mass
@@ -33,12 +34,14 @@ def worst_of(scene: Scene, groups: Sequence[Sequence[Judged]]) -> list[Judged]:
     with elements of one size missed the target by more than the reference's uncertainty, of 22 adaptive ones 2, which
     said so (docs/population.md). Masses by stiffness and heavy ones end alike, and are those that suit `scene`.
     """
-    by_recipe = [{recipe_text(_in_scene(scene, one.case)): one for one in group} for group in groups]
+    usual = usual_mass(scene)
+    by_recipe = [{recipe_text(_in_scene(scene, one.case, usual)): one for one in group} for group in groups]
     common = [text for text in by_recipe[0] if all(text in group for group in by_recipe)]
     recipes = []
     for text in common:
         same = [group[text] for group in by_recipe]
-        case, other_organ = _in_scene(scene, same[0].case), any(one.case.scene.organ != scene.organ for one in same)
+        case = _in_scene(scene, same[0].case, usual)
+        other_organ = any(one.case.scene.organ != scene.organ for one in same)
         if _refused(scene, case) or (other_organ and not case.body.graded):
             continue
         force, displacement, cost, shape, volume = (_largest([getattr(one, name) for one in same]) for name in NUMBERS)
@@ -55,9 +58,9 @@ def worst_of(scene: Scene, groups: Sequence[Sequence[Judged]]) -> list[Judged]:
     return recipes
 
 
-def _in_scene(scene: Scene, case: Case) -> Case:
-    """The recipe of a case in another scene, with the masses that suit it where neither has those of the tissue."""
-    body, usual = case.body, usual_mass(scene)
+def _in_scene(scene: Scene, case: Case, usual: Literal["lumped", "stiffness", "heavy"]) -> Case:
+    """The recipe of a case in another scene, with its `usual` masses where neither has those of the tissue."""
+    body = case.body
     if isinstance(body, QuadraticBody) and "lumped" not in (body.mass, usual):
         body = replace(body, mass=usual)
     return case.replaced(scene=scene, body=body)
