@@ -37,9 +37,11 @@ GRAVITY, ALSO = (1.0, 9.81), 1.0 / 6.0
 """[m/s²], and share of the scenes with another load that have gravity, too."""
 FILLED, OPEN = (1.05, 1.3), 0.25
 """Final volume of a filled lumen over that at rest, and share of the other lumens that are open."""
-MOST = 60e3
-SOLID, HOLLOW = replace(MEMBER, tolerance=0.008, most=MOST), replace(MEMBER, tolerance=0.02, most=MOST, base=430)
-"""Plans of references with bars below a third of the targets; a few minutes of a core."""
+MOST = 80e3
+SOLID = replace(MEMBER, tolerance=0.008, most=MOST, base=600)
+HOLLOW, SCAN = replace(SOLID, tolerance=0.02), 1000
+"""Plans of references with bars below a third of the targets that keep the shape within .5 % of the size, and the
+surface nodes that this takes on a scan; a few minutes of a core."""
 SIDE = 1.2
 """Square of the side of a facet over the area of the surface per node, twice that of a facet: 2 √(4/3) / 2."""
 WITHOUT_FORCE = "surface", "interior", "silhouette", "volume"
@@ -94,10 +96,14 @@ def member(seed: int, number: int, scans: Sequence[Path] = ()) -> Scene:
 
 
 def _plan(scene: Scene, hollow: bool, area: float) -> ReferencePlan:
-    """Of the reference: its coarsest mesh has facets under a sphere or capsule with sides of at most its radius."""
+    """Of the reference: its coarsest mesh has facets under a sphere or capsule with sides of at most its radius, and is
+    halved there at least as often as in any plan."""
     plan, thin = HOLLOW if hollow else SOLID, min((getattr(one, "radius", 1.0) for one in scene.obstacles), default=1.0)
+    plan = replace(plan, base=SCAN) if "path" in scene.organ.parameters else plan
+    if thin == 1.0:
+        return replace(plan, at_contact=0)
     side = (SIDE * area / plan.base) ** 0.5
-    return replace(plan, at_contact=max(0, int(np.ceil(np.log2(side / thin)))))
+    return replace(plan, at_contact=max(plan.at_contact, int(np.ceil(np.log2(side / thin)))))
 
 
 def _organ(rng: np.random.Generator, scans: Sequence[Path]) -> tuple[Organ, Tissue]:

@@ -70,11 +70,13 @@ class Outcome:
 
     @property
     def truth(self) -> str:
-        """ "right", "wrong", "far" wherever in its bar the reference is, or "undecided"."""
+        """ "right", "wrong" or "far": wherever in its bar the reference is, or by a bar of a third of the target;
+        "undecided" where neither says it."""
         known = [(abs(value), bar, target) for value, bar, target in self.errors.values() if not math.isnan(value)]
-        if any(value - bar > FAR * target for value, bar, target in known):
-            return "far"
-        if not known or any(not bar <= BAR * target for _, bar, target in known):
+        for name, bound in ("far", FAR), ("wrong", 1.0):
+            if any(value - bar > bound * target for value, bar, target in known):
+                return name
+        if not known or any(bar > BAR * target and value + bar > target for value, bar, target in known):
             return "undecided"
         return "right" if all(value <= target for value, _, target in known) else "wrong"
 

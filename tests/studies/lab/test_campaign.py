@@ -12,7 +12,7 @@ import pytest
 from studies import StudyError
 from studies.lab.campaign import __main__ as command
 from studies.lab.campaign import outcome
-from studies.lab.campaign.draw import CLEAR, END, LOADS, member
+from studies.lab.campaign.draw import CLEAR, END, LOADS, MOST, member
 from studies.lab.campaign.outcome import Outcome
 from studies.runs.indicators import remarks
 from studies.scene.checks import check_scene, surface_of
@@ -59,7 +59,9 @@ def test_a_member_of_a_scan_is_skipped_with_a_sentence():
         ((-9.2, 0.1, 3.0), MEAN, "far"),
         ((-9.2, 0.9, 3.0), MEAN, "wrong"),  # the reference may be so far off that it is less than 9 %
         ((-30.0, 5.0, 3.0), MEAN, "far"),  # and here not
-        (FORCE, (0.2, 0.4, 1.0), "undecided"),
+        (FORCE, (0.7, 0.4, 1.0), "undecided"),
+        (FORCE, (0.5, 0.4, 1.0), "right"),  # wherever in its bar the reference is
+        (FORCE, (1.5, 0.4, 1.0), "wrong"),
         (NONE, NONE, "undecided"),
     ],
 )
@@ -121,7 +123,7 @@ def test_what_was_interrupted_continues_and_a_silent_body_that_is_far_off_fails(
     text = capfd.readouterr().out
     assert (
         "more than 3 targets off: 1 (" in text
-        and f"--results {tmp_path} --most 60000 --seconds 900 --member 3\n" in text
+        and f"--results {tmp_path} --most {MOST:g} --seconds 900 --member 3\n" in text
         and text.count("member 1 is skipped: its organ is a scan") == 3
         and [text.count(f"{number}: ") for number in (2, 3)] == [1, 1]
     )
