@@ -18,6 +18,7 @@ import numpy as np
 
 from massspring import ImplicitVolume
 from studies.metrics.contact import contact_facets
+from studies.metrics.load_size import beyond
 from studies.metrics.metric import PERCENT
 from studies.metrics.run import Run
 from studies.runs.case import Case
@@ -153,7 +154,10 @@ def _unlike(run: Run) -> str:
     if run.case.scene.cuts:
         return "outside: the rule rests on scenes without cuts"
     ended = next((one for one in (run, run.second) if one.record.status != Status.OK), None)
-    return "" if ended is None else f"the body with {ended.case.body.nodes:,} nodes is {ended.record.status}"
+    if ended is not None:
+        return f"the body with {ended.case.body.nodes:,} nodes is {ended.record.status}"
+    larger = beyond(run.case.scene, run.fields.rest)
+    return f"outside: {larger}" if larger else ""
 
 
 def sentences(runs: Sequence[Run]) -> list[str]:

@@ -8,9 +8,11 @@ from studies.base.errors import StudyError
 from studies.base.lookup import lookup
 from studies.catalog.accuracy import ACCURACY
 from studies.metrics.judged import UNKNOWN, Judged, cheapest, nearest, with_times
+from studies.metrics.load_size import beyond
 from studies.metrics.timing.short import ShortTiming, short_timing
 from studies.metrics.wish import Wish
 from studies.runs.recipes import BodyRecipe
+from studies.scene.checks import surface_of
 from studies.scene.kind import kind_of
 from studies.scene.library import SCENES
 from studies.scene.scene import Scene
@@ -49,6 +51,8 @@ class Advice:
     """Errors of the wish that no scene compares."""
     alike: tuple[str, ...] = ()
     """Scenes of the same kind, where the scene itself was never run; the errors are the worst of them."""
+    beyond: str = ""
+    """Which loads of a scene that was never run are larger than any with which errors were measured."""
     short: ShortTiming | None = None
     """The timing that was taken for this answer."""
     misshapen: Judged | None = None
@@ -83,6 +87,9 @@ def advise(
     evidence, alike = _evidence(scene, Path(results))
     rows = worst_of(scene, list(evidence.cases.values())) if alike else evidence.cases[scene.name]
     answer = replace(_chosen(scene, named, rows, evidence), alike=alike)
+    if alike:
+        larger = beyond(scene, surface_of(scene.organ, scene.name)[0])
+        answer = replace(answer, beyond=larger, meets=answer.meets and not larger)
     if answer.chosen is not None:
         answer = replace(answer, unseen=unseen(Path(results), answer.chosen.case))
     return _timed(answer) if timing else _untimed(answer)
@@ -95,10 +102,11 @@ def recommended(scene: Scene | str, results: Path | str = RESULTS) -> Recommenda
     """
     answer = advise(scene, results=results, timing=False)
     if answer.chosen is None or not answer.meets:
+        undecided = "the reference is not accurate enough to decide" if answer.unknowable else ""
+        why = answer.beyond or undecided or "no body meets the target"
         raise StudyError(
-            f"no recipe is recommended for scene '{answer.scene.name}': "
-            f"{'the reference is not accurate enough to decide' if answer.unknowable else 'no body meets the target'}"
-            f"; `organbench advise {answer.scene.name}` names the closest candidate"
+            f"no recipe is recommended for scene '{answer.scene.name}': {why}; `organbench advise {answer.scene.name}` "
+            "names the closest candidate"
         )
     return Recommendation(answer.chosen.case.body, answer.chosen.case.dt_fraction)
 

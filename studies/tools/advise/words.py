@@ -47,6 +47,8 @@ def _verdict(answer: Advice) -> list[str]:
             "no run of this scene is stored: errors, shape and step are the worst of "
             f"{', '.join(answer.alike)}, scenes of the same kind"
         )
+    if answer.beyond:
+        lines.append(f"its loads are larger than any with which errors were measured: {answer.beyond}")
     for name in answer.unknowable:
         uncertainty = max(getattr(row, name).uncertainty for group in answer.stored.cases.values() for row in group)
         lines.append(f"undecided: the reference is only known to ±{uncertainty:.2g} % of the {name}")
@@ -59,6 +61,8 @@ def _verdict(answer: Advice) -> list[str]:
         words = [f"{name} {share:.2g} times too large" for name, share in shares.items() if name not in one.off_shape]
         missed = ", ".join([*words, off_shape(one)] if one.off_shape else words)
         return [*lines, f"no body meets it; the closest candidate is ({missed}):"]
+    if answer.beyond:
+        return [*lines, "its errors are not known; of smaller loads those of the closest candidate are:"]
     blind = (
         "its computing time is not known on this machine"
         if not one.cost.known

@@ -1,0 +1,52 @@
+"""Which loads are larger than any with which errors were measured."""
+
+from dataclasses import replace
+
+import pytest
+
+from massspring import Ramp, Trajectory
+from studies import BALL_CLAMPED, BALL_SQUEEZE, BLADDER_FILL, LIVER_PROBE, SCENES, SPLEEN_SAG
+from studies.metrics.load_size import beyond
+from studies.scene.checks import surface_of
+
+
+def larger(scene):
+    return beyond(scene, surface_of(scene.organ, scene.name)[0])
+
+
+def farther(one, factor):
+    moved = tuple(tuple(factor * x for x in row) for row in one.path.displacements)
+    return replace(one, path=Trajectory(one.path.times, moved))
+
+
+def pressed(scene, factor):
+    return replace(scene, obstacles=tuple(farther(one, factor) for one in scene.obstacles))
+
+
+def pulled(factor):
+    return replace(BALL_CLAMPED, held=tuple(farther(one, factor) for one in BALL_CLAMPED.held))
+
+
+def filled(share):
+    return replace(BLADDER_FILL, lumen=replace(BLADDER_FILL.lumen, filling=Ramp((0.0, 1.0), (1.0, share))))
+
+
+def test_the_catalogue_is_within_what_was_measured():
+    assert [larger(scene) for scene in SCENES] == [""] * len(SCENES)
+
+
+@pytest.mark.parametrize(
+    ("within", "more", "words"),
+    [
+        # Each plane goes 15 of 100 mm into the ball, after 0 to 2 mm of way.
+        (pressed(BALL_SQUEEZE, 1.4), pressed(BALL_SQUEEZE, 2.6), "planes go into the organ by 0.7"),
+        (pressed(LIVER_PROBE, 2.0), pressed(LIVER_PROBE, 8.0), "a sphere or capsule goes into the organ by"),
+        (pulled(2.0), pulled(2.2), "a clamped region moves by 0.16 of"),  # of 0.072 of the size
+        (SPLEEN_SAG, replace(SPLEEN_SAG, gravity=(0.0, 0.0, -12.0)), "its weight is 0.55 of"),
+        (filled(1.29), filled(1.31), "its lumen changes by 0.31"),
+        (filled(0.71), filled(0.69), "its lumen changes by 0.31"),
+    ],
+)
+def test_a_load_that_is_larger_is_named(within, more, words):
+    assert larger(within) == ""
+    assert larger(more).startswith(words) and larger(more).count("measured up to") == 1
