@@ -1,5 +1,6 @@
 """A number of a case in two results folders, and what its change means given its uncertainty."""
 
+import math
 import re
 from collections import defaultdict
 from collections.abc import Hashable, Iterable, Iterator, Sequence
@@ -34,7 +35,7 @@ class Verdict(StrEnum):
 
 
 MEANING: dict[Verdict, str] = {
-    Verdict.SAME_BITS: "the records of both folders are equal to the last bit, and so are the numbers",
+    Verdict.SAME_BITS: "the numbers are equal to the last bit, in both records too",
     Verdict.ROUND_OFF: f"equal to a relative {ROUND_OFF:g}, which is what a table shows",
     Verdict.WITHIN_FLOOR: "the change is within the uncertainty of the reference, or within the spread of the timing",
     Verdict.MOVED: "the change is larger than that uncertainty, or the number is no longer there",
@@ -51,6 +52,8 @@ def verdict_of(old: float, new: float, floor: float, same_bits: bool) -> Verdict
         return Verdict.MOVED
     if old != old:
         return Verdict.NOT_RESOLVABLE
+    if old != new and not (math.isfinite(old) and math.isfinite(new)):
+        return Verdict.MOVED
     if old == new or abs(new - old) <= ROUND_OFF * max(abs(old), abs(new)):
         return Verdict.SAME_BITS if same_bits and old == new else Verdict.ROUND_OFF
     if floor != floor:
@@ -116,14 +119,14 @@ class Change:
 
 
 def row_changes(case: Named, old: Row, new: Row, same_bits: bool = False) -> Iterator[Change]:
-    """Changes of the status of a case and of all metrics that both rows have."""
+    """Changes of the status of a case and of all metrics of the old row; one that the new row lacks has moved."""
     if old.get(STATUS) != new.get(STATUS):
         yield Change(case, STATUS, "", str(old.get(STATUS)), str(new.get(STATUS)), np.nan, Verdict.MOVED)
-    for column in [column for column in old if column in new]:
+    for column in old:
         named = METRIC.match(str(column))
-        if named is None or named["name"] == "dt" or (pd.isna(old[column]) and pd.isna(new[column])):
+        if named is None or named["name"] == "dt" or (pd.isna(old[column]) and pd.isna(new.get(column))):
             continue
-        name, before, after = named["name"], float(old[column]), float(new[column])
+        name, before, after = named["name"], float(old[column]), float(new.get(column, np.nan))
         floor = max(floor_of(old, name, named["unit"]), floor_of(new, name, named["unit"]))
         if name not in JUDGED and name not in TIMES:
             floor = SMALLEST
@@ -160,7 +163,8 @@ def record_changes(case: Named, old: Record, new: Record, rows: Sequence[Row] = 
             start = mine.get("rest") if name == "snapshots" else one[0] if name == "surface" else None
             known = max((floor_of(row, JUDGE[name]) for row in rows if name in JUDGE), default=np.nan) / 100
             floor = np.fmax(known * _largest(one if start is None else one - start), ROUND_OFF * _largest(one))
-            change = np.where(np.isnan(one) & np.isnan(other), 0.0, np.abs(other - one))
+            alike = (one == other) | (np.isnan(one) & np.isnan(other))
+            change = np.where(alike, 0.0, np.abs(np.subtract(other, one, where=~alike, out=np.zeros_like(one))))
             at = np.unravel_index(np.argmax(np.where(np.isnan(change), np.inf, change)), change.shape)
             before, after = float(one[at]), float(other[at])
             same = np.array_equal(one, other, equal_nan=True)
@@ -179,7 +183,8 @@ def _numbers_in(record: Record) -> dict[str, np.ndarray]:
 
 
 def _largest(values: np.ndarray) -> float:
-    return float(np.fmax.reduce(np.abs(values), axis=None, initial=0.0))
+    """Of the sizes of finite values."""
+    return float(np.fmax.reduce(np.abs(values), axis=None, initial=0.0, where=np.isfinite(values)))
 
 
 def labels_of(cases: Iterable[Named]) -> dict[Named, str]:

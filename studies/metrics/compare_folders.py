@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
+from pandas.api.types import is_numeric_dtype
 
 from studies.base.errors import StudyError
 from studies.metrics.change import (
@@ -132,6 +133,9 @@ class Shelf:
             return {}
         for name in [name for name in (*ROW, STATUS, REFERENCE) if name in table.columns]:
             table[name] = table[name].astype(object).fillna("")
+        texts = [column for column in table if METRIC.match(str(column)) and not is_numeric_dtype(table[column])]
+        if texts:
+            raise StudyError(f"{path} has a text among the numbers of its column '{texts[0]}'; {AGAIN}")
         return _by_key(((str(row["scene"]), str(row["recipe"])), row) for row in table.to_dict("records"))
 
     @cached_property
@@ -213,10 +217,15 @@ def compare(old: Path | str, new: Path | str) -> Comparison:
     old, new = Path(old), Path(new)
     mine, theirs = _shelves(old), _shelves(new)
     changes, findings, only_old, only_new = list[Change](), list[str](), 0, 0
+    tables = not any(shelf.has_records for shelf in (*mine.values(), *theirs.values()))
     for study in sorted(set(mine) & set(theirs)):
         one, other = mine[study], theirs[study]
         recorded = one.has_records and other.has_records
         found = _by_record(one, other) if recorded else _by_row(one, other)
+        if tables and (
+            bare := [f"{scene} {recipe}" for scene, recipe in one.rows if (scene, recipe) not in other.rows]
+        ):
+            other.find(f"lacks {len(bare)} rows that {one.folder} has", bare)
         if one.has_records and not other.has_records:
             other.findings[f"{other.folder} holds a table alone, {one.folder} holds records"] = None
         if None in (one.machine, other.machine) or one.machine != other.machine:
@@ -224,9 +233,11 @@ def compare(old: Path | str, new: Path | str) -> Comparison:
         keys = [set(shelf.files if recorded else shelf.rows) for shelf in (one, other)]
         only_old, only_new = only_old + len(keys[0] - keys[1]), only_new + len(keys[1] - keys[0])
         changes, findings = changes + found, [*findings, *one.findings, *other.findings]
-    lost = [study for study, shelf in mine.items() if shelf.has_records and study not in theirs]
-    findings += [f"{new / study} holds no records, {old / study} does" for study in lost]
-    if not changes and not findings:
+    lost = [study for study, shelf in mine.items() if study not in theirs and (tables or shelf.has_records)]
+    findings += [f"{new / study} holds no results, {old / study} does" for study in lost]
+    only_old += sum(len(shelf.rows) for study, shelf in mine.items() if study not in theirs)
+    only_new += sum(len(shelf.rows) for study, shelf in theirs.items() if study not in mine)
+    if not changes and (tables or not findings):
         raise StudyError(f"{old} and {new} have no case in common; compare folders in which the same study has run")
     return Comparison(changes, findings, only_old, only_new, (machine_of(old), machine_of(new)))
 

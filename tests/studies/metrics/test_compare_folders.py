@@ -22,7 +22,7 @@ from studies.sweep.load import load_runs
 from tests.studies.tiny import tiny_study
 
 PUBLISHED = Path(__file__).parents[3] / "results" / "published"
-NAN = float("nan")
+NAN, INF = float("nan"), float("inf")
 
 
 @pytest.mark.parametrize(
@@ -37,6 +37,9 @@ NAN = float("nan")
         (2.0, 2.05, NAN, False, Verdict.NOT_RESOLVABLE),
         (NAN, 2.0, 0.1, False, Verdict.NOT_RESOLVABLE),
         (2.0, NAN, NAN, False, Verdict.MOVED),
+        (2.0, INF, INF, False, Verdict.MOVED),
+        (-INF, INF, 0.1, False, Verdict.MOVED),
+        (INF, INF, NAN, True, Verdict.SAME_BITS),
         (0.0, 0.0, NAN, False, Verdict.ROUND_OFF),
     ],
 )
@@ -77,6 +80,27 @@ def test_the_larger_floor_of_both_counts(tmp_path):
     assert compare(old, new).moved == []
 
 
+@pytest.mark.parametrize(
+    ("there", "said"),
+    [
+        ({"table": rows(), "study": "other"}, "holds no results"),
+        ({"table": rows()[:1]}, "lacks 1 rows"),
+        ({"table": [{k: v for k, v in row.items() if k != "min_j [1]"} for row in rows()]}, "min_j"),
+        ({"table": rows()}, None),
+    ],
+)
+def test_what_a_table_lost_is_found(tmp_path, there, said):
+    comparison = compare(folder(tmp_path / "old", rows()), folder(tmp_path / "new", **there))
+    found = [*comparison.findings, *(change.metric for change in comparison.moved)]
+    assert any(said in sentence for sentence in found) if said else found == []
+
+
+def test_a_text_among_numbers_is_named(tmp_path):
+    old, new = folder(tmp_path / "old", rows()), folder(tmp_path / "new", rows(**{"force_end [%]": "abc"}))
+    with pytest.raises(StudyError, match=r"text among the numbers of its column 'force_end \[%\]'"):
+        compare(old, new)
+
+
 @pytest.mark.parametrize("old", [{}, {"reference": "2027.1 0a0a0a0a"}])
 def test_errors_against_two_references_are_not_judged(tmp_path, old):
     """The force moved by ten times its uncertainty, but its reference differs; a number without a reference moved."""
@@ -110,6 +134,10 @@ def edited(folder, **changes):
     write_record(path, replace(record, fields=fields, attributes=attributes, status=status))
 
 
+def infinite(values):
+    return np.where(np.arange(len(values))[:, None, None] == 1, np.inf, values)
+
+
 def in_table(folder, column, value):
     path = folder / "tiny" / "tiny.csv"
     table = pd.read_csv(path)
@@ -130,13 +158,14 @@ PLANTED = {
     "a record is deleted": (lambda folder: remove(record_files(folder, "tiny")[0]), "lacks 1 records"),
     "all are": (lambda folder: remove(*(folder / "tiny").glob("*.h5")), "holds a table alone"),
     "all but the index": (lambda folder: remove(*record_files(folder, "tiny")), "rows in its table without a record"),
-    "the study is": (lambda folder: (folder / "tiny").rename(folder / "another"), "holds no records"),
+    "the study is": (lambda folder: (folder / "tiny").rename(folder / "another"), "holds no results"),
     "a record is empty": (lambda folder: record_files(folder, "tiny")[0].write_bytes(b""), "was cut off"),
     "a time is empty": (lambda folder: next(folder.glob("tiny/*.timing.*")).write_bytes(b""), "was cut off"),
     "the status": (lambda folder: edited(folder, status="inverted"), "status"),
     "the force": (lambda folder: edited(folder, contact_force=lambda force: 1.1 * force), "contact_force"),
     "a volume": (lambda folder: edited(folder, volume=lambda volume: 1.001 * volume), "volume_worst"),
     "the least J": (lambda folder: edited(folder, min_j=lambda j: 0.99 * j), "min_j"),
+    "a force on the way": (lambda folder: edited(folder, contact_force=infinite), "contact_force"),
     "J is lost": (lambda folder: edited(folder, min_j=lambda j: np.nan * j), "min_j"),
     "penetration": (lambda folder: edited(folder, penetration=lambda depth: depth + 1e-4), "penetration"),
     "positions": (lambda folder: edited(folder, snapshots=lambda x: 1.02 * x), "snapshots"),
