@@ -81,18 +81,24 @@ def test_the_larger_floor_of_both_counts(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("there", "said"),
+    ("table", "said"),
     [
-        ({"table": rows(), "study": "other"}, "holds no results"),
-        ({"table": rows()[:1]}, "lacks 1 rows"),
-        ({"table": [{k: v for k, v in row.items() if k != "min_j [1]"} for row in rows()]}, "min_j"),
-        ({"table": rows()}, None),
+        (None, "holds no results"),
+        (rows()[:1], "lacks 1 rows"),
+        ([{name: value for name, value in row.items() if name != "min_j [1]"} for row in rows()], "min_j"),
+        (rows(), None),
     ],
 )
-def test_what_a_table_lost_is_found(tmp_path, there, said):
-    comparison = compare(folder(tmp_path / "old", rows()), folder(tmp_path / "new", **there))
+def test_what_a_table_lost_is_found(tmp_path, table, said):
+    for path in (old := tmp_path / "old", new := tmp_path / "new"):
+        folder(path, rows())
+    folder(old, rows(), study="second")
+    if table:
+        folder(new, table, study="second")
+    comparison = compare(old, new)
     found = [*comparison.findings, *(change.metric for change in comparison.moved)]
     assert any(said in sentence for sentence in found) if said else found == []
+    assert comparison.only_old == (2 if table is None else 2 - len(table))
 
 
 def test_a_text_among_numbers_is_named(tmp_path):
