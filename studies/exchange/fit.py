@@ -17,6 +17,9 @@ SAME = 1e-6
 """Largest difference of equal rest positions, over the size of the body; allows for storage as 32-bit floats."""
 FAR = 20.0
 """Displacement, in sizes of the body, beyond which positions are in another unit or the body has burst."""
+SMALL = 0.5
+"""Size of a step over that of the body at rest below which it may be displacements, and cosine of the angle between
+both below which it is: displacements are no copy of the body."""
 SAME_TIME = 1e-6
 """Largest difference of equal times, over the duration of the scene."""
 
@@ -44,6 +47,7 @@ def fitted(handed: Handed, scene: Scene, meshes: Sequence[GivenMesh]) -> Fitting
     mesh = _mesh_of(name, x.shape[1], meshes)
     _check_rest(name, x[0], mesh)
     _check_near(name, t, x)
+    _check_positions(name, t, x)
     for key, values in handed.histories.items():
         if values.shape != t.shape:
             raise StudyError(f"{name}: {key} has shape {values.shape} for {len(t)} steps; give one number for each")
@@ -58,6 +62,9 @@ def force_at(name: str, t: np.ndarray, times: np.ndarray, force: np.ndarray, sce
     """
     if not len(times):
         raise StudyError(f"{name} has no force")
+    gaps = np.diff(order := np.sort(times))
+    if (gaps <= 0.0).any():
+        raise StudyError(f"{name} has several forces at t = {order[np.argmin(gaps)]:g} s; give one")
     nearest = np.abs(times[None] - t[:, None]).argmin(axis=1)
     missing = np.abs(times[nearest] - t) > SAME_TIME * scene.duration
     if missing.any():
@@ -86,6 +93,8 @@ def _times(handed: Handed, scene: Scene) -> np.ndarray:
         raise StudyError(f"{name}: steps are missing at t = {_list(missing)} s{rest}; hand in all of {_list(times)}")
     if t[0] < -near or abs(t[0]) > near:
         raise StudyError(f"{name}: the first step is at t = {t[0]:g} s; begin with the rest shape at t = 0")
+    if t[-1] > scene.duration + near:
+        raise StudyError(f"{name}: the last step is at t = {t[-1]:g} s, after the scene ends at {scene.duration:g} s")
     return t
 
 
@@ -160,6 +169,20 @@ def _check_near(name: str, t: np.ndarray, x: np.ndarray) -> None:
             f"{name}: a node at t = {t[far[0]]:g} s is {moved[far[0]]:.3g} m from its place at rest, "
             f"{moved[far[0]] / size:.2g} times the size of the body; hand in all steps in metres"
         )
+
+
+def _check_positions(name: str, t: np.ndarray, x: np.ndarray) -> None:
+    """Raises StudyError for the first step that is much smaller than the body at rest, and not of its form, so that its
+    numbers are displacements."""
+    rest, *steps = (one - one.mean(axis=0) for one in x)
+    size = float(np.linalg.norm(rest))
+    for time, step in zip(t[1:], steps, strict=True):
+        small = float(np.linalg.norm(step)) / size
+        if small < SMALL and abs(float(np.sum(step * rest))) < SMALL * small * size**2:
+            raise StudyError(
+                f"{name}: the body at t = {time:g} s is {small:.2g} times as large as at rest, and not of its form, so "
+                "these are displacements; add the rest positions to all steps"
+            )
 
 
 def _gap(one: np.ndarray, other: np.ndarray) -> float:

@@ -4,6 +4,7 @@ import re
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 from zipfile import ZipFile, is_zipfile
@@ -43,10 +44,10 @@ def read_handed(path: Path) -> Handed:
     """
     if path.is_dir() or "*" in path.name:
         return _read_series(path)
-    if path.suffix.lower() not in READERS:
-        raise StudyError(f"{path.name}: entries are read from {', '.join(READERS)} or a folder of {SUFFIX} files")
     if not path.is_file():
         raise StudyError(f"there is no file {path}")
+    if path.suffix.lower() not in READERS:
+        raise StudyError(f"{path.name}: entries are read from {', '.join(READERS)} or a folder of {SUFFIX} files")
     try:
         return READERS[path.suffix.lower()](path)
     except StudyError:
@@ -93,7 +94,7 @@ def _check_separators(path: Path) -> None:
 
 def _read_npz(path: Path) -> Handed:
     if not is_zipfile(path):
-        raise StudyError(f"{path.name} is not an npz file; numpy.savez writes one")
+        raise StudyError(f"{path.name} is no npz file, or was cut off; numpy.savez writes one")
     with ZipFile(path) as packed:
         check_unpacked(sum(one.file_size for one in packed.infolist()), path.name, "hand in the checkpoints alone")
     with np.load(path, allow_pickle=False) as file:
@@ -113,11 +114,18 @@ def _read_npz(path: Path) -> Handed:
 
 def _read_csv(path: Path) -> Handed:
     table = _table(path, ("t", "node", "x", "y", "z")).sort_values(["t", "node"], kind="stable")
+    if table.empty:
+        raise StudyError(f"{path.name} holds no rows; it needs one for each node and step")
+    double = table[table.duplicated(["t", "node"])]
+    if len(double):
+        t, node = double.iloc[0][["t", "node"]]
+        raise StudyError(f"{path.name}: node {node:g} has several rows at t = {t:g} s; give one")
     t, counts = np.unique(table["t"], return_counts=True)
     nodes = table["node"].to_numpy()
-    if len(set(counts.tolist())) != 1:
-        odd = int(np.argmin(counts))
-        raise StudyError(f"{path.name}: step t = {t[odd]:g} s has {counts[odd]} nodes, others have {counts.max()}")
+    usual = max(counts, key=lambda count: (int((counts == count).sum()), count))
+    if (counts != usual).any():
+        odd = int(np.argmax(counts != usual))
+        raise StudyError(f"{path.name}: step t = {t[odd]:g} s has {counts[odd]} nodes, others have {usual}")
     if not np.array_equal(nodes, np.tile(np.arange(counts[0]), len(t))):
         raise StudyError(f"{path.name}: nodes are numbered {nodes.min():g} to {nodes.max():g}; number them from 0 on")
     positions = table[["x", "y", "z"]].to_numpy(np.float64).reshape(len(t), counts[0], 3)
@@ -159,7 +167,18 @@ def _read_series(path: Path) -> Handed:
     files = sorted(folder.glob(pattern))
     if not files:
         raise StudyError(f"{folder} holds no file {pattern}")
+    for one, other in pairwise(files):
+        if _numbers(one) > _numbers(other):
+            raise StudyError(
+                f"{folder.name}: is {other.name} before or after {one.name}? Write their numbers with as many digits, "
+                "0002 and 0010, or hand in a PVD file, which has the times"
+            )
     return Handed(path.name, None, _of_grids(path.name, files), {})
+
+
+def _numbers(path: Path) -> list[str | float]:
+    """The words and whole numbers of which a name consists, alternately."""
+    return [float(part) if part.isdigit() else part for part in re.split(r"(\d+)", path.stem)]
 
 
 def _of_grids(name: str, files: Sequence[Path]) -> np.ndarray:

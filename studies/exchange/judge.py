@@ -54,7 +54,8 @@ def judge(
     fit the scene; nothing is kept then.
     """
     if file.suffix.lower() != ".json":
-        record = entry_record(scene, file, name or file.stem, nodes, force, seconds)
+        named = name or (file.parent if "*" in file.name else file).stem
+        record = entry_record(scene, file, named, nodes, force, seconds)
     elif name or force is not None or seconds is not None:
         raise StudyError(f"{file.name} says all about the entry itself; leave out --name, --force and --seconds")
     else:

@@ -14,6 +14,7 @@ from studies.exchange.league import LEAGUE, check_entry, read_entry_file
 from studies.exchange.meshes import NODES
 from studies.metrics.cells import MISSED_MARK, MISSED_NOTE, UNRESOLVED_NOTE, plain, value_cell
 from studies.metrics.judged import FORCE
+from studies.metrics.metric import PERCENT
 from studies.metrics.run import Run
 from studies.metrics.wish import missed
 from studies.report.results import report_entry
@@ -21,6 +22,8 @@ from studies.scene.quantities import ALWAYS
 from studies.store.ledger import Ledger
 from studies.sweep.find_scene import find_scene
 
+UNITS, NEAR = {"mN": 1e-3, "kN": 1e3}, 50.0
+"""Size of a wrong unit of force [N], and |force_end| [%] below which the force is in this unit."""
 REVERSED = -100.0
 """force_end [%] below which a force of the other sign fits better."""
 
@@ -61,12 +64,15 @@ def judge(
     with busy("drawing the page"):
         page, remarks = report_entry(Ledger(results), run, chosen_scene)
     warn(remarks)
-    say(f"{page}: next to the reference and our methods")
+    say(f"{page}: next to {'our methods' if run.reference is None else 'the reference and our methods'}")
 
 
 def hints_of(run: Run) -> list[str]:
     hints = [text] if (text := str(run.record.attributes["warnings"])) else []
     error = FORCE(run)
+    for unit, factor in UNITS.items():
+        if abs(in_unit := PERCENT * ((1.0 + error / PERCENT) * factor - 1.0)) < NEAR:
+            hints.append(f"is the force in {unit}? Then its error is {plain(in_unit, '+')} %; give it in N")
     if error < REVERSED:
         hints.append(
             f"the force has the wrong sign: reversed, its error is {plain(2 * REVERSED - error, '+')} % and not "

@@ -111,6 +111,7 @@ def read_points(path: Path) -> tuple[np.ndarray, dict[str, np.ndarray]]:
         with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
             grid = meshio.read(path)
     except (Exception, SystemExit) as error:  # the readers of meshio may raise any exception
-        raise StudyError(f"{path.name} cannot be read as a grid ({str(error).splitlines()[:1]})") from error
+        reason = f"{type(error).__name__}: {error}".splitlines()[0]
+        raise StudyError(f"{path.name} cannot be read as a grid; is it whole? ({reason})") from error
     points = np.asarray(grid.points, dtype=np.float64)
     return points, {name: np.asarray(values) for name, values in grid.point_data.items()}

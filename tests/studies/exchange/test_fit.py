@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from studies.base.errors import StudyError
-from studies.exchange.judge import judge
+from studies.exchange.judge import entry_record, judge
 from tests.studies.exchange.handed_in import NODES
 from tests.studies.octant import SCENE
 
@@ -27,6 +27,10 @@ def wrong(ours, which):
         x = 1e3 * x[:, ::-1]
     elif which == "steps in mm":
         x[1:] *= 1e3
+    elif which == "late displacements":
+        x[1:] -= x[0]
+    elif which == "shrunk":  # a body that has lost its volume is judged
+        x[1:] *= 0.3
     elif which == "burst":
         x[9, 5, 1] = 1e300
     return {
@@ -47,6 +51,7 @@ POSITIONS = {
     "permuted": "the nodes are those of straight.vtu in another order (number 3 is its number 9)",
     "moved": "the positions at t = 0 are up to 0.00346 m from those of straight.vtu",
     "displacements": "are all zero, so these are displacements; add the rest positions of straight.vtu",
+    "late displacements": "and not of its form, so these are displacements; add the rest positions to all steps",
     "few": "positions of 187 nodes, but straight.vtu 188 and curved.vtu 1112 at this number of vertices",
     "nan": "positions of node 5 at t = 0.7 s is not a finite number",
     "steps in mm": "times the size of the body; hand in all steps in metres",
@@ -75,6 +80,10 @@ HISTORIES = {
     "short force": (lambda o: {"force": o.force[:-1]}, "force has shape (40,) for 41 steps"),
     "force nan": (lambda o: {"force": np.where(o.t == 2.0, np.nan, o.force)}, "force at t = 2 s is not a finite"),
     "no steps": (lambda o: {"t": o.t[:0], "positions": o.positions[:0]}, "a.npz holds no steps; hand in rest and"),
+    "too late": (
+        lambda o: {"t": np.append(o.t, 9.0), "positions": np.append(o.positions, o.positions[-1:], axis=0)},
+        "the last step is at t = 9 s, after the scene ends at 4 s",
+    ),
     "other times": (lambda o: {"t": o.t[:5]}, "41 steps for 5 times"),
 }
 
@@ -84,3 +93,15 @@ def test_times_and_forces_that_do_not_fit_are_refused(ours, tmp_path, what):
     change, message = HISTORIES[what]
     short = {"force": None, "pressure": None} if "positions" in change(ours) else {}
     assert message in sentence_of(ours.npz(tmp_path / "a.npz", **short | change(ours)), tmp_path)
+
+
+@pytest.mark.parametrize("double", [False, True])
+def test_a_body_that_shrinks_is_judged_and_a_force_twice_at_one_time_is_not(ours, tmp_path, double):
+    path, force = ours.npz(tmp_path / "a.npz", positions=wrong(ours, "shrunk"), force=None), tmp_path / "f.csv"
+    rows = [f"{t:.17g},1.0" for t in ours.t] + ["2.0,3.0"] * double
+    force.write_text("\n".join(["t,force", *rows]))
+    if double:
+        with pytest.raises(StudyError, match=r"f\.csv has several forces at t = 2 s; give one"):
+            entry_record(SCENE, path, "theirs", NODES, force)
+    else:
+        assert entry_record(SCENE, path, "theirs", NODES, force).fields["t"].values[-1] == 4.0

@@ -77,14 +77,18 @@ def test_every_form_holds_the_same_positions(ours, tmp_path, form):
     assert np.abs(found.positions - expected.positions[rows]).max() <= near
 
 
+MANY = "t,node,x,y,z\n0,0,0,0,0\n1,0,0,0,0\n1,1,0,0,0\n2,0,0,0,0\n"
 FILES = {
     "a.txt": ("", "entries are read from .npz, .csv, .vtkhdf, .hdf, .pvd or a folder of .vtu files"),
-    "a.npz": ("no zip", "a.npz is not an npz file; numpy.savez writes one"),
+    "a.npz": ("no zip", "a.npz is no npz file, or was cut off; numpy.savez writes one"),
     "a.vtkhdf": ("no HDF5", "a.vtkhdf cannot be read"),
     "a.pvd": ("<VTKFile>", "a.pvd cannot be read"),
     "a.csv": ("t,node,x,y\n0,0,0,0\n", "a.csv lacks the column 'z'"),
     "b.csv": ("t,node,x,y,z\n0,1,0,0,0\n0,2,0,0,0\n", "nodes are numbered 1 to 2; number them from 0 on"),
     "c.csv": ("t,node,x,y,z\n0,0,0,0,0\n0,1,0,0,0\n1,0,0,0,0\n", "step t = 1 s has 1 nodes, others have 2"),
+    "h.csv": ("t,node,x,y,z\n0,0,0,0,0\n0,0,0,0,0\n1,0,0,0,0\n", "h.csv: node 0 has several rows at t = 0 s; give one"),
+    "i.csv": ("t,node,x,y,z\n", "i.csv holds no rows; it needs one for each node and step"),
+    "j.csv": (MANY, "step t = 1 s has 2 nodes, others have 1"),
     "e.csv": ("t;node;x;y;z\n0;0;0,5;0;0\n", "e.csv has semicolons between its columns and commas in its numbers"),
     "f.csv": ("t;node;x;y;z\n0;0;0.5;0;0\n", "semicolons between its columns: write commas between columns and points"),
     "g.csv": ("t,node,x,y,z\n0,0,0,5,0,1,0,0\n", "g.csv has commas in its numbers"),
@@ -99,6 +103,18 @@ def test_a_file_that_is_none_is_refused(tmp_path, name):
     with pytest.raises(StudyError) as refused:
         read_handed(tmp_path / name)
     assert message in str(refused.value)
+
+
+def test_files_whose_order_is_not_that_of_their_numbers_are_refused(ours, tmp_path):
+    folder = as_vtu(ours, tmp_path / "a")
+    files = sorted(folder.glob("*.vtu"))
+    for number, file in zip((2, 9, 10), files, strict=True):
+        file.rename(folder / f"step_{number}.vtu")
+    with pytest.raises(StudyError, match=r"a: is step_2\.vtu before or after step_10\.vtu\? Write their numbers"):
+        read_handed(folder)
+    (folder / "step_10.vtu").rename(folder / "step_11a.vtu")
+    (folder / "step_11a.vtu").rename(folder / "step_91.vtu")
+    assert len(read_handed(folder).positions) == 3
 
 
 def test_a_missing_file_and_one_with_a_flipped_byte_are_refused(ours, tmp_path):
