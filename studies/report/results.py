@@ -127,7 +127,7 @@ def charts_and_tables(ledger: Ledger, studies: Sequence[Study]) -> tuple[list[Pa
     # Not of studies that were never run here: the published references of all scenes take a minute to read and measure.
     present = [study for study in studies if study.name not in absent]
     written += refresh_uncertainty(references, [scene for study in present for scene in study.scenes])
-    if not is_archive(root):
+    if present and not is_archive(root):
         write_machine(root / "machine.json")
     if absent:
         remarks.append(

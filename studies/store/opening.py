@@ -100,7 +100,7 @@ def open_results(path: Path | str) -> Iterator[h5py.File]:
     if path.suffix == SUFFIX and is_there(path) and not path.is_file():
         raise DamagedFile(f"{path} is not a file: delete it, and run its study again")
     if not is_there(path) or not path.is_file():
-        raise StudyError(f"there is no results file {path}: `organbench show` says which cases are stored")
+        raise StudyError(f"there is no results file {path}: `organbench run` makes those of a study or scene")
     try:
         with reading(path, INDEX_KIND, VIEWS, check_seal(path)) as file:
             yield file

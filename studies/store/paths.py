@@ -33,7 +33,7 @@ def key_hash(key: str) -> str:
 def study_folder(root: Path, study: str) -> Path:
     """The folder of `study` below `root`. Raises StudyError for a name that would lead elsewhere."""
     if readable(study) != study:
-        raise StudyError(f"{study!r} cannot name a study: use letters, digits, '_' and '-'")
+        raise StudyError(f"{study!r} cannot name a study or scene: use letters, digits, '_' and '-'")
     return Path(root) / study
 
 

@@ -15,6 +15,8 @@ from studies.geometry.files.units import ORGAN, SMALLEST, Source, stem_of
 NODES = 550
 OPENINGS, FOLDS = 5e-3, 3e-3
 """Values of --solid and --smooth in trials [m]."""
+PART = 0.5
+"""Largest part of a body that an opening may be: a larger one is closed in a grid of many times the body."""
 MOST = 100_000
 """Most triangles of a file for which advice is tested; a test takes seconds."""
 BEYOND = {"bad_points", "size", "far_away", "duplicate_tetrahedra"}
@@ -34,7 +36,7 @@ def with_command(source: Source, diagnosis: Findings) -> Findings:
         source = replace(source, unit=diagnosis.measures["unit"])
     works, attempts, measures = None, dict[str, Findings | None](), diagnosis.measures
     if not codes & BEYOND and measures["triangles"] <= MOST and SMALLEST <= max(measures["size"]) <= ORGAN[1]:
-        for how in ways(codes, wall_of(source) if measures["lumens"] else None):
+        for how in ways(codes, max(measures["size"]), wall_of(source) if measures["lumens"] else None):
             body = attempts[options(how)] = examined(source, how)
             if body is not None and body.clean:
                 works = how
@@ -62,9 +64,9 @@ def marked(mend: str, works: bool, attempts: Mapping[str, Findings | None]) -> s
     return f"{words}; {name} makes a body, in which this is left: {left}"
 
 
-def ways(codes: set[str], wall: float | None) -> Iterator[dict[str, Any]]:
-    """Arguments of `scan` that may repair these findings, the gentlest first; wall: [m] of a hollow body, which none
-    may fill."""
+def ways(codes: set[str], size: float, wall: float | None = None) -> Iterator[dict[str, Any]]:
+    """Arguments of `scan` that may repair these findings, the gentlest first. size: longest side of the body, of which
+    no opening may be a large part; wall: of a hollow body, which none may fill [m]."""
     lids: dict[str, Any] = {"holes": True} if "open" in codes else {}
     if wall is not None:
         yield lids | {"wall": wall}
@@ -74,7 +76,8 @@ def ways(codes: set[str], wall: float | None) -> Iterator[dict[str, Any]]:
         if "handles" not in codes:
             yield lids
         yield lids | {"smooth": FOLDS}
-    yield {"solid": OPENINGS}
+    if PART * size > OPENINGS:
+        yield {"solid": OPENINGS}
     if "shell" not in codes and "handles" in codes:
         yield lids
 

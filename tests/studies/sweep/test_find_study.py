@@ -64,6 +64,8 @@ BROKEN = {
     "a cut has the name ''; give it one": f"{TOP}from studies.scene.library import BALL_INCISED\n"
     "unnamed = replace(BALL_INCISED.cut, name='')\n"
     "STUDY = tiny_study(cases=(tiny_case(scene=replace(BALL_INCISED, cuts=(unnamed,))),))\n",
+    "'accuracy' is a study of the program; give yours": study("name='accuracy'"),
+    "dt0.5 of scene 'tiny_squeeze' is there twice; leave one out": study("cases=2 * (tiny_case(),)"),
     "recorded is 'kinetic'; give": case("recorded='kinetic'"),
 }
 

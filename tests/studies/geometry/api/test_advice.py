@@ -63,3 +63,9 @@ def test_a_file_of_no_organs_size_is_not_meshed(monkeypatch, tmp_path):
     source = Source(stored(tmp_path / "large.ply", POINTS / 30.5, FACES[3:]))
     findings = advice.with_command(source, examine(source)).findings
     assert "an organ's in no unit we know" in findings[0].sentence and findings[1].mend.startswith("try ")
+
+
+@pytest.mark.parametrize(("size", "filled"), [(0.1, True), (1e-3, False)])
+def test_no_opening_is_tried_that_is_a_large_part_of_the_body(size, filled):
+    """Filling a sheet of 1 mm with openings of 5 mm took minutes and 7 GB."""
+    assert any("solid" in how for how in advice.ways({"open"}, size)) == filled
