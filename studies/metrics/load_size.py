@@ -39,7 +39,7 @@ def beyond(scene: Scene, points: np.ndarray) -> str:
     filling = (1.0,) if lumen is None else lumen.filling.values
     filled = max(abs(value / filling[0] - 1.0) for value in filling)
     sizes = zip(LARGEST.items(), (planes, tools, pulls, weight, filled), strict=True)
-    larger = [f"{words.format(f'{a:.2g}')} (measured up to {most:.2g})" for (words, most), a in sizes if a > most]
+    larger = [f"{words.format(f'{a:.3g}')} (measured up to {most:.2g})" for (words, most), a in sizes if a > most]
     return ", ".join(larger)
 
 

@@ -82,7 +82,9 @@ def test_each_mesh_has_its_interval_and_an_organ_that_hangs_another():
     run = pair()
     assert interval(run)[:2] == pytest.approx((1.0 * (0.5 + 2.0), 1.0 * (0.5 + 10.0)))
     assert interval(replace(run.second, second=run))[:2] == pytest.approx((2.0 * (0.5 + 2.0), 2.0 * (0.5 + 10.0)))
-    hung = interval(pair(scene=replace(SPLEEN_SAG, checkpoints=BALL.checkpoints, organ=BALL.organ)))
+    hung = interval(
+        pair(scene=replace(SPLEEN_SAG, gravity=(0.0, 0.0, -5.0), checkpoints=BALL.checkpoints, organ=BALL.organ))
+    )
     assert math.isnan(hung.force) and hung.displacement == pytest.approx(4.0 * (1.0 + 10.0))
     one = judged(run)
     assert one.bounds and (one.force.value, one.displacement.value) == pytest.approx((2.5, 10.5))
@@ -116,6 +118,7 @@ def test_a_load_that_no_member_was_under_is_named(monkeypatch):
         ({"fine": replace(FINE, nodes=1694)}, "it takes two meshes"),
         ({"coarse": replace(FINE, nodes=1494)}, "it takes two meshes"),
         ({"scene": CUT}, "scenes without cuts"),
+        ({"scene": replace(BALL, gravity=(0.0, 0.0, -99.0))}, r"outside: its weight is .* \(measured up to 0.5\)"),
         ({"status": Status.FOLDED}, "the body with 1,194 nodes is folded"),
         ({"force": 1.06}, "outside: forces of the two meshes that differ by 6 %, more than any organ .* rests on .5."),
         ({"shift": 0.75}, "outside: displacements of the two meshes that differ by 25 %, more"),

@@ -195,6 +195,22 @@ def test_errors_of_other_scenes_say_on_how_many_meshes(tmp_path, never_timed):
     assert "the largest of 10 neighbouring meshes of 2 scenes; median 1.2 %" in "\n".join(lines_of(advice))
 
 
+def test_a_load_beyond_what_was_measured_is_named_and_meets_nothing(results):
+    (plane,) = LIVER_PRESS.obstacles
+
+    def pressed(factor):
+        rows = tuple(tuple(factor * x for x in row) for row in plane.path.displacements)
+        return like(LIVER_PRESS, obstacles=(replace(plane, path=replace(plane.path, displacements=rows)),))
+
+    within, beyond = (advise(pressed(factor), results=results, timing=False) for factor in (2.0, 6.0))
+    assert within.meets and not beyond.meets
+    text = "\n".join(lines_of(beyond))
+    assert "its loads are larger than any with which errors were measured: planes go into the organ by 0." in text
+    assert "its errors are not known; of smaller loads those of the closest candidate are:" in text
+    with pytest.raises(StudyError, match=r"measured up to 0\.45"):
+        recommended(pressed(6.0), results=results)
+
+
 def test_the_same_name_with_another_load_was_never_run(results):
     deeper = replace(LIVER_PRESS, duration=9.0)
     assert advise(deeper, results=results, timing=False).alike == ("liver_press",)
