@@ -198,9 +198,11 @@ def test_errors_of_other_scenes_say_on_how_many_meshes(tmp_path, never_timed):
 def test_a_load_beyond_what_was_measured_is_named_and_meets_nothing(results):
     (plane,) = LIVER_PRESS.obstacles
 
-    def pressed(factor):
+    def pressed(factor):  # as slowly
         rows = tuple(tuple(factor * x for x in row) for row in plane.path.displacements)
-        return like(LIVER_PRESS, obstacles=(replace(plane, path=replace(plane.path, displacements=rows)),))
+        path = replace(plane.path, displacements=rows, times=tuple(factor * t for t in plane.path.times))
+        scene = like(LIVER_PRESS, obstacles=(replace(plane, path=path),))
+        return replace(scene, duration=factor * LIVER_PRESS.duration)
 
     within, beyond = (advise(pressed(factor), results=results, timing=False) for factor in (2.0, 6.0))
     assert within.meets and not beyond.meets
