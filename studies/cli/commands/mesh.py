@@ -51,7 +51,7 @@ def mesh(
     name: Annotated[str, typer.Argument(help="an organ (see `organbench list organs`); leave it out with --from")] = "",
     source: Annotated[Path | None, typer.Option("--from", help="a file instead: STL, OBJ, VTK, glTF, a mask …")] = None,
     output: Annotated[Path, typer.Option("-o", "--output", help=f"{' '.join(VOLUMES + SURFACES)}")] = Path("mesh.vtu"),
-    nodes: Annotated[int | None, typer.Option(help="outer nodes; without it a file keeps its own")] = None,
+    nodes: Annotated[int | None, typer.Option(min=1, help="outer nodes; without it a file keeps its own")] = None,
     fill: Annotated[bool | None, typer.Option("--fill/--surface", help="with tetrahedra, or only the surface")] = None,
     order: Annotated[int, typer.Option(min=1, max=2, help="2: curved elements that follow the true shape")] = 1,
     wall: Annotated[float | None, typer.Option(help="wall thickness of a hollow body in mm")] = None,
