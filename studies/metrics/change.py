@@ -124,9 +124,11 @@ def row_changes(case: Named, old: Row, new: Row, same_bits: bool = False) -> Ite
         yield Change(case, STATUS, "", str(old.get(STATUS)), str(new.get(STATUS)), np.nan, Verdict.MOVED)
     for column in old:
         named = METRIC.match(str(column))
-        if named is None or named["name"] == "dt" or (pd.isna(old[column]) and pd.isna(new.get(column))):
+        if named is None or named["name"] == "dt":
             continue
         name, before, after = named["name"], float(old[column]), float(new.get(column, np.nan))
+        if math.isnan(before) and math.isnan(after):
+            continue
         floor = max(floor_of(old, name, named["unit"]), floor_of(new, name, named["unit"]))
         if name not in JUDGED and name not in TIMES:
             floor = SMALLEST
