@@ -145,7 +145,7 @@ def wrong_options(folder):
         "thick wall": ((*scan, "--nodes", 150, "--wall", 30, *out), "does not fit into it"),
         "wall of a file": ((*scan, "--wall", 3, *out), "set its number of nodes"),
         "few nodes": ((*scan, "--nodes", 10, *out), "10 surface nodes asked for"),
-        "no nodes": (("mesh", "ball", "--nodes", 0, *out), "0 surface nodes asked for"),
+        "no nodes": (("mesh", "ball", "--nodes", 0, *out), "invalid value for '--nodes'"),
         "few nodes of an organ": (("mesh", "liver", "--nodes", 20, *out), "20 surface nodes asked for"),
         "folder": (("mesh", "ball", "--nodes", 150, "-o", folder / "egg.ply" / "out.vtu"), "was not written"),
         "missing": (("mesh", "--check", folder / "none.ply"), "there is no mesh file"),
