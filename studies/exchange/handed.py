@@ -178,7 +178,7 @@ def _read_series(path: Path) -> Handed:
 
 def _numbers(path: Path) -> list[str | float]:
     """The words and whole numbers of which a name consists, alternately."""
-    return [float(part) if part.isdigit() else part for part in re.split(r"(\d+)", path.stem)]
+    return [float(part) if part.isdecimal() else part for part in re.split(r"(\d+)", path.stem)]
 
 
 def _of_grids(name: str, files: Sequence[Path]) -> np.ndarray:
