@@ -172,16 +172,16 @@ def _check_near(name: str, t: np.ndarray, x: np.ndarray) -> None:
 
 
 def _check_positions(name: str, t: np.ndarray, x: np.ndarray) -> None:
-    """Raises StudyError for the first step that is much smaller than the body at rest, and not of its form, so that its
-    numbers are displacements."""
+    """Raises StudyError for the first step that is much smaller than the body at rest, and not of its form, as
+    displacements are."""
     rest, *steps = (one - one.mean(axis=0) for one in x)
     size = float(np.linalg.norm(rest))
     for time, step in zip(t[1:], steps, strict=True):
         small = float(np.linalg.norm(step)) / size
         if small < SMALL and abs(float(np.sum(step * rest))) < SMALL * small * size**2:
             raise StudyError(
-                f"{name}: the body at t = {time:g} s is {small:.2g} times as large as at rest, and not of its form, so "
-                "these are displacements; add the rest positions to all steps"
+                f"{name}: the body at t = {time:g} s is {small:.2g} times as large as at rest, and not of its form; if "
+                "these are displacements, add the rest positions to all steps"
             )
 
 

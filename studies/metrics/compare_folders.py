@@ -138,6 +138,11 @@ class Shelf:
             raise StudyError(f"{path} has a text among the numbers of its column '{texts[0]}'; {AGAIN}")
         return _by_key(((str(row["scene"]), str(row["recipe"])), row) for row in table.to_dict("records"))
 
+    @property
+    def size(self) -> int:
+        """The number of its cases; no record is opened."""
+        return len(self.files if self.has_records else self.table)
+
     @cached_property
     def metrics(self) -> set[str]:
         """Names of those in its table; of all without one."""
@@ -222,10 +227,9 @@ def compare(old: Path | str, new: Path | str) -> Comparison:
         one, other = mine[study], theirs[study]
         recorded = one.has_records and other.has_records
         found = _by_record(one, other) if recorded else _by_row(one, other)
-        if tables and (
-            bare := [f"{scene} {recipe}" for scene, recipe in one.rows if (scene, recipe) not in other.rows]
-        ):
-            other.find(f"lacks {len(bare)} rows that {one.folder} has", bare)
+        lacking = [" ".join(key) for key in one.rows if key not in other.rows] if tables else []
+        if lacking:
+            other.find(f"lacks {len(lacking)} rows that {one.folder} has", lacking)
         if one.has_records and not other.has_records:
             other.findings[f"{other.folder} holds a table alone, {one.folder} holds records"] = None
         if None in (one.machine, other.machine) or one.machine != other.machine:
@@ -235,8 +239,8 @@ def compare(old: Path | str, new: Path | str) -> Comparison:
         changes, findings = changes + found, [*findings, *one.findings, *other.findings]
     lost = [study for study, shelf in mine.items() if study not in theirs and (tables or shelf.has_records)]
     findings += [f"{new / study} holds no results, {old / study} does" for study in lost]
-    only_old += sum(len(shelf.rows) for study, shelf in mine.items() if study not in theirs)
-    only_new += sum(len(shelf.rows) for study, shelf in theirs.items() if study not in mine)
+    only_old += sum(shelf.size for study, shelf in mine.items() if study not in theirs)
+    only_new += sum(shelf.size for study, shelf in theirs.items() if study not in mine)
     if not changes and (tables or not findings):
         raise StudyError(f"{old} and {new} have no case in common; compare folders in which the same study has run")
     return Comparison(changes, findings, only_old, only_new, (machine_of(old), machine_of(new)))

@@ -45,16 +45,16 @@ def find_study(name: str) -> Study:
         raise StudyError(f"{file}: the study '{study.name}' has no cases; give at least one")
     if any(study.name == other.name and study.cases != other.cases for other in (*STUDIES, DEMO)):
         raise StudyError(f"{file}: '{study.name}' is a study of the program; give yours a name of its own")
-    by_key = sorted(study.cases, key=lambda case: case.key)
-    double = next((one for one, other in pairwise(by_key) if one.key == other.key), None)
-    if double is not None:
-        raise StudyError(f"{file}: the case {double.name} of scene '{double.scene.name}' is there twice; leave one out")
     for scene in study.scenes:
         check_clock(scene, f"{file}: ")
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", "Pydantic serializer warnings")  # the sentence for an odd setting is ours
         for case in study.cases:
             _check_stored(name, case)
+    by_key = sorted(study.cases, key=lambda case: case.key)
+    double = next((one for one, other in pairwise(by_key) if one.key == other.key), None)
+    if double is not None:
+        raise StudyError(f"{file}: the case {double.name} of scene '{double.scene.name}' is there twice; leave one out")
     return study
 
 

@@ -98,9 +98,10 @@ def member(seed: int, number: int, scans: Sequence[Path] = ()) -> Scene:
 def _plan(scene: Scene, hollow: bool, area: float) -> ReferencePlan:
     """Of the reference: its coarsest mesh has facets under a sphere or capsule with sides of at most its radius, and is
     halved there at least as often as in any plan."""
-    plan, thin = HOLLOW if hollow else SOLID, min((getattr(one, "radius", 1.0) for one in scene.obstacles), default=1.0)
+    plan, radii = HOLLOW if hollow else SOLID, [getattr(one, "radius", np.inf) for one in scene.obstacles]
     plan = replace(plan, base=SCAN) if "path" in scene.organ.parameters else plan
-    if thin == 1.0:
+    thin = min(radii, default=np.inf)
+    if thin == np.inf:
         return replace(plan, at_contact=0)
     side = (SIDE * area / plan.base) ** 0.5
     return replace(plan, at_contact=max(plan.at_contact, int(np.ceil(np.log2(side / thin)))))

@@ -51,7 +51,7 @@ POSITIONS = {
     "permuted": "the nodes are those of straight.vtu in another order (number 3 is its number 9)",
     "moved": "the positions at t = 0 are up to 0.00346 m from those of straight.vtu",
     "displacements": "are all zero, so these are displacements; add the rest positions of straight.vtu",
-    "late displacements": "and not of its form, so these are displacements; add the rest positions to all steps",
+    "late displacements": "and not of its form; if these are displacements, add the rest positions to all steps",
     "few": "positions of 187 nodes, but straight.vtu 188 and curved.vtu 1112 at this number of vertices",
     "nan": "positions of node 5 at t = 0.7 s is not a finite number",
     "steps in mm": "times the size of the body; hand in all steps in metres",

@@ -1,10 +1,12 @@
 """Which loads are larger than any with which errors were measured."""
 
+import re
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
-from massspring import Ramp, Trajectory
+from massspring import Capsule, Ramp, Sphere, Trajectory
 from studies import BALL_CLAMPED, BALL_SQUEEZE, BLADDER_FILL, LIVER_PROBE, SCENES, SPLEEN_SAG
 from studies.metrics.load_size import beyond
 from studies.scene.checks import surface_of
@@ -50,3 +52,21 @@ def test_the_catalogue_is_within_what_was_measured():
 def test_a_load_that_is_larger_is_named(within, more, words):
     assert larger(within) == ""
     assert larger(more).startswith(words) and larger(more).count("measured up to") == 1
+
+
+@pytest.mark.parametrize("thin", [True, False])
+@pytest.mark.parametrize("rod", [0.0, 0.03])
+def test_the_thickness_is_that_under_the_tool(thin, rod):
+    """A tool goes 6 mm into a plate of 10 mm, or into the block of 100 mm to which it belongs."""
+    x, y = (axis.ravel() for axis in np.meshgrid(np.linspace(-0.1, 0.1, 41), np.linspace(-0.1, 0.1, 41)))
+    top = np.where(x > 0.0, 0.01, 0.1)
+    points = np.concatenate([np.stack([x, y, 0.0 * x], axis=1), np.stack([x, y, top], axis=1)])
+    side, height = (0.05, 0.021) if thin else (-0.05, 0.111)
+    down = Trajectory(
+        (0.0, 1.0, 9.0), ((0.0, 0.0, 0.0), (0.0, 0.0, -0.007), (0.0, 0.0, -0.09))
+    )  # the scene ends at 1 s
+    start, end = ((side, sign * rod, height) for sign in (-1.0, 1.0))
+    tool = Capsule(start, end, 0.01, down) if rod else Sphere(start, 0.01, down)
+    words = beyond(replace(LIVER_PROBE, obstacles=(tool,), held=(), duration=1.0), points)
+    numbers = [float(number) for number in re.findall(r"by ([\d.]+) of the thickness", words)]
+    assert numbers == ([pytest.approx(0.6, abs=0.004)] if thin else []), words  # its first touch is known to a moment
