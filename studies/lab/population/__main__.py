@@ -1,5 +1,6 @@
-"""`python -m studies.lab.population`: the tables of random organs from what `organbench run` has stored of them."""
+"""`python -m studies.lab.population [RESULTS]`: the tables of random organs from the runs of `organbench run`."""
 
+import argparse
 import sys
 from pathlib import Path
 
@@ -15,7 +16,7 @@ TEXTS = {
 }
 
 
-def main(results: Path = Path("results")) -> None:
+def main(results: Path) -> None:
     runs, problems = load_runs(results, STUDY)
     for name, text in TEXTS.items():
         path = results / POPULATION / name
@@ -25,4 +26,6 @@ def main(results: Path = Path("results")) -> None:
 
 
 if __name__ == "__main__":
-    main(*map(Path, sys.argv[1:]))
+    parser = argparse.ArgumentParser(prog="python -m studies.lab.population", description=__doc__)
+    parser.add_argument("results", type=Path, nargs="?", default=Path("results"))
+    main(parser.parse_args().results)

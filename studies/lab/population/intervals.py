@@ -4,9 +4,9 @@ members in FOLDER/pairs.csv, default the published ones, and intervals.md, how i
 Members of other files, those of campaigns, are added to FOLDER/pairs.csv.
 """
 
+import argparse
 import json
 import math
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -108,7 +108,7 @@ def intervals_of(pairs: pd.DataFrame) -> str:
     return "\n".join(lines)
 
 
-def main(folder: Path = PUBLISHED, *others: Path) -> None:
+def main(folder: Path, *others: Path) -> None:
     pairs = pd.concat(map(pd.read_csv, (folder / PAIRS, *others))).drop_duplicates("scene", keep="last")
     pairs.to_csv(folder / PAIRS, index=False)
     seeds = sorted(set(pairs["scene"].str.split("_").str[-2].astype(int)))
@@ -118,4 +118,8 @@ def main(folder: Path = PUBLISHED, *others: Path) -> None:
 
 
 if __name__ == "__main__":
-    main(*map(Path, sys.argv[1:]))
+    parser = argparse.ArgumentParser(prog="python -m studies.lab.population.intervals", description=__doc__)
+    parser.add_argument("folder", type=Path, nargs="?", default=PUBLISHED)
+    parser.add_argument("pairs", type=Path, nargs="*")
+    given = parser.parse_args()
+    main(given.folder, *given.pairs)
