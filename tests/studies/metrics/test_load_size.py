@@ -8,6 +8,8 @@ import pytest
 
 from massspring import Capsule, Ramp, Sphere, Trajectory
 from studies import BALL_CLAMPED, BALL_SQUEEZE, BLADDER_FILL, LIVER_PROBE, SCENES, SPLEEN_SAG
+from studies.catalog.checks import check_study
+from studies.catalog.of_scene import study_of
 from studies.metrics.load_size import beyond
 from studies.scene.checks import surface_of
 
@@ -44,7 +46,7 @@ def test_the_catalogue_is_within_what_was_measured():
         (pressed(BALL_SQUEEZE, 1.4), pressed(BALL_SQUEEZE, 2.6), "planes go into the organ by 0.7"),
         (pressed(LIVER_PROBE, 2.0), pressed(LIVER_PROBE, 8.0), "a sphere or capsule goes into the organ by"),
         (pulled(2.0), pulled(2.2), "a clamped region moves by 0.159 of"),  # of 0.072 of the size
-        (SPLEEN_SAG, replace(SPLEEN_SAG, gravity=(0.0, 0.0, -12.0)), "its weight is 0.54"),
+        (SPLEEN_SAG, replace(SPLEEN_SAG, gravity=(0.0, 0.0, -12.0)), "its weight rho g L is 0.54"),
         (filled(1.29), filled(1.31), "its lumen changes by 0.31"),
         (filled(0.71), filled(0.69), "its lumen changes by 0.31"),
     ],
@@ -70,3 +72,10 @@ def test_the_thickness_is_that_under_the_tool(thin, rod):
     words = beyond(replace(LIVER_PROBE, obstacles=(tool,), held=(), duration=1.0), points)
     numbers = [float(number) for number in re.findall(r"by ([\d.]+) of the thickness", words)]
     assert numbers == ([pytest.approx(0.6, abs=0.004)] if thin else []), words  # its first touch is known to a moment
+
+
+def test_a_run_warns_of_them_before_it_starts():
+    heavy = replace(SPLEEN_SAG, gravity=tuple(10 * g for g in SPLEEN_SAG.gravity))
+    (sentence,) = check_study(study_of(heavy))
+    assert "measured up to 0.5" in sentence and "errors are unknown" in sentence
+    assert check_study(study_of(SPLEEN_SAG)) == []
