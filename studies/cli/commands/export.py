@@ -17,7 +17,7 @@ from studies.tools.advise.yardsticks import yardsticks
 def export(
     scene: SceneName,
     output: Annotated[
-        Path | None, typer.Option("-o", "--output", help="folder to write  [default: the name of the scene]")
+        Path | None, typer.Option("-o", "--output", help="folder to write  \\[default: the name of the scene]")
     ] = None,
     nodes: Annotated[int, typer.Option(help="vertices on the outer surface")] = NODES,
     results: Results = Path("results"),

@@ -37,7 +37,7 @@ def judge(
         ),
     ],
     name: Annotated[str, typer.Option(help="name of the entry in tables and charts; default: the file's name")] = "",
-    force: Annotated[Path | None, typer.Option(help="CSV file with the columns t [s] and force [N]")] = None,
+    force: Annotated[Path | None, typer.Option(help="CSV file with the columns t \\[s] and force \\[N]")] = None,
     seconds: Annotated[float | None, typer.Option(help="computing time for one simulated second")] = None,
     nodes: Annotated[int, typer.Option(help="vertices on the outer surface, as in the exported mesh")] = NODES,
     results: Results = Path("results"),

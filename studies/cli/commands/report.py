@@ -25,7 +25,7 @@ def report(
         list[str] | None, typer.Argument(metavar="STUDY", help=GIVEN, autocompletion=terminal.studies)
     ] = None,
     results: Results = Path("results"),
-    figures: Annotated[bool, typer.Option(help="also draw the organs and the squeezed ball")] = False,
+    figures: Annotated[bool, typer.Option(help="also draw the organs and the figures of the paper")] = False,
 ) -> None:
     """Draw charts and tables from what is stored and write report.html, which shows all studies. Nothing runs."""
     named = {name: find_study(name) for name in studies or []}

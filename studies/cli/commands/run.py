@@ -63,7 +63,7 @@ def run(
     case: Annotated[str, typer.Option(help="only the case with this name or part of a name; draws no charts")] = "",
     only: Annotated[str, typer.Option(help="run only cases that are failed, stale, or both (failed,stale)")] = "",
     jobs: Annotated[
-        int | None, typer.Option(min=1, help="processes for the physics; timings always run alone  [default: 2]")
+        int | None, typer.Option(min=1, help="processes for the physics; timings always run alone  \\[default: 2]")
     ] = None,
     on: Annotated[str, typer.Option(help=f"{WORDS} (docs/cluster.md)")] = "",
     again: Annotated[str, typer.Option(help=AGAIN)] = "",

@@ -20,7 +20,7 @@ def view(
         typer.Argument(metavar="SCENE|CASE", help="a scene or a FILE.py for all its cases, or a results file"),
     ] = None,
     output: Annotated[
-        Path | None, typer.Option("-o", "--output", help=f"{SUFFIX} file  [default: SCENE{SUFFIX}]")
+        Path | None, typer.Option("-o", "--output", help=f"{SUFFIX} file  \\[default: SCENE{SUFFIX}]")
     ] = None,
     results: Results = Path("results"),
 ) -> None:
