@@ -1,1 +1,1 @@
-"""Silicone as the judge: a cast beam under its weight and two tip loads, measured by others, predicted by ours."""
+"""Measured silicone: a cast beam under its weight and two tip loads, measured by others, predicted by ours."""
