@@ -28,9 +28,12 @@ def advise(
     """Recommend the cheapest accurate body for a scene, with its measured errors and its cost.
 
     Without --force and --displacement: force within 3 %, displacement within 1 %; hollow organs 6 % and 3 %.
+    Exit code 1: no body is known to meet that.
     """
     bounds = share(force, "force"), share(displacement, "displacement"), in_time(budget)
     with compiling("timing") as report, watching(report):
         advice = answered(find_scene(scene), *bounds, results=results, timing=timing)
     for line in lines_of(advice):
         say(line)
+    if not advice.meets:
+        raise typer.Exit(1)
