@@ -1,4 +1,4 @@
-"""The timing protocol (docs/theory.md, section 7): one pinned core, one thread, warm-up outside, repeats interleaved."""
+"""The timing protocol (docs/theory.md, section 7): one pinned core and thread, warm-up outside, repeats interleaved."""
 
 import gc
 import os
