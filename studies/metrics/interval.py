@@ -1,9 +1,10 @@
 """How far a body is from the truth in a scene without a reference, by the same recipe on a second mesh.
 
-Ninety of 100 errors are within q (floor + change): change is the difference between the two meshes, floor and q come
-from bodies whose errors are known (interval.json, made by studies.lab.population). This is split conformal prediction
-with a scaled score (Lei et al. 2018, doi:10.1080/01621459.2017.1307116, section 5.2). Two meshes show the error of the
-mesh alone, which dominates that of a body; a halved step or other masses hardly change it (docs/accuracy.md).
+Ninety of 100 errors are within q (floor + change) (1 + w shape): change is the difference between the two meshes, shape
+how far the body is off its organ at rest; floor, w and q come from bodies whose errors are known (interval.json, made
+by studies.lab.population). This is split conformal prediction with a scaled score (Lei et al. 2018,
+doi:10.1080/01621459.2017.1307116, section 5.2). Two meshes show the error of the mesh alone, which dominates that of a
+body; a halved step or other masses hardly change it (docs/accuracy.md). Of a wrong shape both have a part in common.
 """
 
 import json
@@ -32,8 +33,8 @@ NAN = float("nan")
 RULE_FILE = Path(__file__).with_name("interval.json")
 RULE: dict[str, Any] = json.loads(RULE_FILE.read_text(encoding="utf-8"))
 """`seeds` of the members that it rests on and the `commit` that made it; `nodes` of their two meshes; of the force and
-the displacement of each `group`: number of `members`, `floor` [%], and `factor` of the body with each number of
-nodes [1]; `loads` that they were under; `seen`: the farthest end of each sign."""
+the displacement of each `group`: number of `members`, `floor` [%], weight `of_shape` [1/%], and `factor` of
+the body with each number of nodes [1]; `loads` that they were under; `seen`: the farthest end of each sign."""
 OF_100 = 90
 WITHIN = "force_within", "mean_within"
 """The metrics that an interval gives."""
@@ -129,17 +130,23 @@ def interval(run: Run) -> Interval:
             return Interval(why=f"outside: {what}")
     rules = {name: RULE[name].get(group(load_of(run.case.scene))) for name in Apart._fields}
     force, displacement = (
-        NAN if rule is None else bound(rule, seen[name], run.case.body.nodes) for name, rule in rules.items()
+        NAN if rule is None else bound(rule, seen[name], seen["shape"], run.case.body.nodes)
+        for name, rule in rules.items()
     )
     if math.isnan(force) and math.isnan(displacement):
         return Interval(why="outside: the rule rests on no organ in which the scene's quantities are compared")
     return Interval(force, displacement)
 
 
-def bound(rule: Mapping[str, Any], change: Any, nodes: int) -> Any:
-    """What 90 of 100 errors of the body with so many of RULE's nodes stay within [%]; change: of `Apart`, or an array
-    of it [%]."""
-    return rule["factor"][str(nodes)] * (rule["floor"] + change)
+def bound(rule: Mapping[str, Any], change: Any, shape: Any, nodes: int) -> Any:
+    """What 90 of 100 errors of the body with so many of RULE's nodes stay within [%]; change: of `Apart` [%], shape: of
+    SIGNS [%], or arrays of both."""
+    return rule["factor"][str(nodes)] * scale(rule, change, shape)
+
+
+def scale(rule: Mapping[str, Any], change: Any, shape: Any) -> Any:
+    """What errors are in proportion to [%]; arguments as `bound`."""
+    return (rule["floor"] + change) * (1.0 + rule["of_shape"] * shape)
 
 
 def _unlike(run: Run) -> str:

@@ -16,7 +16,7 @@ import pandas as pd
 
 from studies import Run, Status
 from studies.lab.commit import commit
-from studies.metrics.interval import OF_100, RULE_FILE, SIGNS, Apart, bound, group, second_mesh, signs
+from studies.metrics.interval import OF_100, RULE_FILE, SIGNS, Apart, bound, group, scale, second_mesh, signs
 from studies.metrics.judged import DISPLACEMENT, FORCE
 from studies.metrics.wish import usual_wish
 from studies.scene.kind import load_of
@@ -25,6 +25,10 @@ PUBLISHED, PAIRS = Path("results/published/population"), "pairs.csv"
 NODES = 1194, 1594
 """Of the two meshes of `organbench run FILE.py`."""
 ERRORS = dict(zip(Apart._fields, (FORCE, DISPLACEMENT), strict=True))
+FLOORS = Apart(force=1.0, displacement=0.05)
+"""Floors over the median change: two forces can be equal by chance, two displacements all over a surface hardly can."""
+WEIGHTS = Apart(force=0.0, displacement=1.0)
+"""Of the shape [1/%]. With it displacements of livers, which have thin margins, are inside as often as others."""
 BAR = 1.0 / 3.0
 """Largest uncertainty of a reference that judges, over the target of the scene."""
 
@@ -50,20 +54,21 @@ def pairs_of(runs: Sequence[Run]) -> pd.DataFrame:
 
 
 def rule_of(pairs: pd.DataFrame) -> dict[str, Any]:
-    """The rule by the members of a table of pairs, none for a load with too few. Floors are medians of the changes."""
+    """The rule by the members of a table of pairs, none for a load with too few."""
     seen = {name: np.fmax if than == "more" else np.fmin for name, (_, than) in SIGNS.items()}  # both pass over NaN
     rule: dict[str, Any] = {"nodes": list(NODES)}
     rule["seen"] = {name: float(end.reduce(pairs[name].to_numpy(float))) for name, end in seen.items()}
     rule["loads"], kinds = sorted(set(pairs["load"])), pairs["load"].map(group).to_numpy(str)
     for name in Apart._fields:
-        change, rule[name] = pairs[name].to_numpy(float), {}
+        change, shape, rule[name] = pairs[name].to_numpy(float), pairs["shape"].to_numpy(float), {}
         for kind in sorted(set(kinds[np.isfinite(change)])):
             some = np.isfinite(change) & (kinds == kind)
-            floor = float(np.median(change[some]))
-            scores = {str(n): pairs[f"{name}_{n}"].to_numpy(float)[some] / (floor + change[some]) for n in NODES}
-            factor = {n: quantile(score) for n, score in scores.items()}
+            floor = getattr(FLOORS, name) * float(np.median(change[some]))
+            entry = {"members": int(some.sum()), "floor": floor, "of_shape": getattr(WEIGHTS, name)}
+            sizes = scale(entry, change[some], shape[some])
+            factor = {str(n): quantile(pairs[f"{name}_{n}"].to_numpy(float)[some] / sizes) for n in NODES}
             if max(factor.values()) < math.inf:
-                rule[name][kind] = {"members": int(some.sum()), "floor": floor, "factor": factor}
+                rule[name][kind] = entry | {"factor": factor}
     return rule
 
 
@@ -81,7 +86,7 @@ def left_out(pairs: pd.DataFrame) -> pd.DataFrame:
     organ, kind = pairs["organ"].to_numpy(str), pairs["load"].map(group).to_numpy(str)
     half, rows = pairs["scene"].str.split("_").str[-1].astype(int).to_numpy() % 2, []
     for name in Apart._fields:
-        change, error = (pairs[column].to_numpy(float) for column in (name, f"{name}_{NODES[1]}"))
+        change, shape, error = (pairs[one].to_numpy(float) for one in (name, "shape", f"{name}_{NODES[1]}"))
         known, width = np.isfinite(change), np.full(len(pairs), np.nan)
         for load_, each, part in sorted(set(zip(kind[known], organ[known], half[known], strict=True))):
             alike = known & (kind == load_)
@@ -89,7 +94,7 @@ def left_out(pairs: pd.DataFrame) -> pd.DataFrame:
             rule = rule_of(pairs.loc[others if others.any() else alike & (half != part)])
             some = alike & (organ == each) & (half == part)
             if load_ in rule[name]:
-                width[some] = bound(rule[name][load_], change[some], NODES[1])
+                width[some] = bound(rule[name][load_], change[some], shape[some], NODES[1])
         judged = np.isfinite(width)
         for each in [*dict.fromkeys(organ[judged]), "all"]:
             some = judged & ((organ == each) | (each == "all"))

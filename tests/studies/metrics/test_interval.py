@@ -37,8 +37,8 @@ FINE = QuadraticBody(1594, graded="adaptive")
 COARSE = replace(FINE, nodes=1194)
 BALL = made_up_run.SCENE
 CUT = replace(BALL, cuts=(Cut("section", HalfSpace((0.0, 0.0, 0.0), (0.0, 0.0, 1.0)), at=0.1),))
-OTHER = {"members": 9, "floor": 0.5, "factor": {"1194": 2.0, "1594": 1.0}}
-HUNG = {"members": 9, "floor": 1.0, "factor": {"1194": 5.0, "1594": 4.0}}
+OTHER = {"members": 9, "floor": 0.5, "of_shape": 0.0, "factor": {"1194": 2.0, "1594": 1.0}}
+HUNG = {"members": 9, "floor": 1.0, "of_shape": 0.0, "factor": {"1194": 5.0, "1594": 4.0}}
 SEEN = {"force": 5.0, "displacement": 20.0, "sway": 9.0, "shape": 99.0, "facets": 0.0}
 RULE = {
     "nodes": [1194, 1594],
@@ -88,6 +88,13 @@ def test_each_mesh_has_its_interval_and_an_organ_that_hangs_another():
     assert math.isnan(hung.force) and hung.displacement == pytest.approx(4.0 * (1.0 + 10.0))
     one = judged(run)
     assert one.bounds and (one.force.value, one.displacement.value) == pytest.approx((2.5, 10.5))
+
+
+def test_a_body_off_its_shape_has_a_wider_interval(monkeypatch):
+    monkeypatch.setitem(RULE, "displacement", {"other": OTHER | {"of_shape": 2.0}})
+    run = pair()
+    run.__dict__["shape"] = ShapeErrors(0.0025, 0.0)
+    assert interval(run)[:2] == pytest.approx((2.5, 10.5 * (1.0 + 2.0 * 0.25)))
 
 
 def test_the_sentence_has_the_force_and_the_displacement_of_the_finest_body():
