@@ -123,6 +123,8 @@ def interval(run: Run) -> Interval:
         return Interval(why=why)
     assert run.second is not None  # _unlike checked that
     seen = signs(*sorted((run.second, run), key=lambda one: one.case.body.nodes))
+    if math.isnan(seen["shape"]):
+        return Interval(why="the shape of its organ is unknown: the mesh file is missing or has changed")
     for name, (words, than) in SIGNS.items():
         value, end = seen[name], RULE["seen"][name]
         if value > end if than == "more" else value < end:

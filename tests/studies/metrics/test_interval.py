@@ -95,6 +95,9 @@ def test_a_body_off_its_shape_has_a_wider_interval(monkeypatch):
     run = pair()
     run.__dict__["shape"] = ShapeErrors(0.0025, 0.0)
     assert interval(run)[:2] == pytest.approx((2.5, 10.5 * (1.0 + 2.0 * 0.25)))
+    lost = pair()
+    lost.__dict__["shape"] = ShapeErrors(math.nan, math.nan)
+    assert interval(lost).why.startswith("the shape of its organ is unknown")
 
 
 def test_the_sentence_has_the_force_and_the_displacement_of_the_finest_body():
