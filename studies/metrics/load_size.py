@@ -9,7 +9,7 @@ LARGEST = {
     "planes go into the organ by {} of its thickness": 0.45,
     "a sphere or capsule goes into the organ by {} of the thickness under it": 1.0 / 3.0,
     "a clamped region moves by {} of the organ's size": 0.15,
-    "its weight rho g L is {} of its shear modulus": 0.5,
+    "its weight rho g L is {} times its shear modulus": 0.5,
     "its lumen changes by {} of its volume": 0.3,
 }
 """Of the scenes of the catalogue and of the random ones of studies.lab.campaign, whose bodies were held against
