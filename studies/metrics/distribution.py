@@ -1,13 +1,12 @@
 """Distribution of a metric over the members of a population: median, range, worst member, and their confidence."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+import pandas as pd
 
 from studies.metrics.metric import Metric
-from studies.metrics.run import Run
-from studies.runs.recipe_text import body_words
 from studies.store.record import Status
 
 BOUND = 0.95
@@ -99,31 +98,15 @@ def _interval(values: np.ndarray, statistic: object, seed: int) -> tuple[float, 
     return (float(ends.low), float(ends.high))
 
 
-@dataclass(frozen=True)
-class Group:
-    """The runs of one body on the members of one organ."""
-
-    organ: str
-    body: str
-    runs: tuple[Run, ...]
-
-    def values(self, entry: Metric) -> tuple[dict[str, float], dict[str, float]]:
-        """Member -> value, and member -> uncertainty of its reference; NaN for a run that did not end well."""
-        ok = {run.case.scene.name: run for run in self.runs if run.record.status == Status.OK}
-        names = [run.case.scene.name for run in self.runs]
-        nan = float("nan")
-        return (
-            {name: entry(ok[name]) if name in ok else nan for name in names},
-            {name: entry.uncertainty(ok[name]) if name in ok else nan for name in names},
-        )
-
-    def of(self, entry: Metric) -> Distribution:
-        return distribution(*self.values(entry))
+def distribution_of(rows: pd.DataFrame, entry: Metric) -> Distribution:
+    """Of a metric in rows of studies.metrics.table, a member each. Raises KeyError for a column that they lack."""
+    names = [str(name) for name in rows["scene"]]
+    values, floors = (dict(zip(names, column, strict=True)) for column in columns_of(rows, entry))
+    return distribution(values, floors)
 
 
-def groups(runs: Sequence[Run]) -> list[Group]:
-    """Runs by organ and body, in their order; organs from files are "file"."""
-    members: dict[tuple[str, str], list[Run]] = {}
-    for run in runs:
-        members.setdefault((run.case.scene.organ.shape, body_words(run.case.body)), []).append(run)
-    return [Group(organ, body, tuple(some)) for (organ, body), some in members.items()]
+def columns_of(rows: pd.DataFrame, entry: Metric) -> tuple[pd.Series, pd.Series]:
+    """The values of a metric in such rows, NaN for what ended badly, and the uncertainties of their references."""
+    value, floor = f"{entry.name} [{entry.unit}]", f"{entry.name} floor [{entry.unit}]"
+    known = rows if floor in rows else rows.assign(**{floor: np.nan})  # a table without any has no such column
+    return known.loc[:, value].where(known["status"] == Status.OK), known.loc[:, floor]

@@ -1,31 +1,47 @@
-"""`python -m studies.lab.population [RESULTS]`: the tables of random organs from the runs of `organbench run`."""
+"""`python -m studies.lab.population [RESULTS [FOLDER ...]]`: the tables and charts of random organs from the runs of
+`organbench run`, and from the tables of FOLDERs, of members that ran on other machines by the same code."""
 
 import argparse
 import sys
+from dataclasses import replace
 from pathlib import Path
 
-from studies import load_runs
+import pandas as pd
+
+from studies import StudyError, load_runs
+from studies.lab.population.charts import write
 from studies.lab.population.intervals import PAIRS, pairs_of
+from studies.lab.population.rows import KEY, groups, key, merged, rows_of
 from studies.lab.population.study import POPULATION, STUDY
-from studies.lab.population.tables import members_of, worst_of
+from studies.lab.population.tables import members_of
 
-TEXTS = {
-    "population.md": members_of,
-    "worst.md": worst_of,
-    PAIRS: lambda runs: pairs_of(runs).to_csv(index=False, float_format="%.4g").rstrip(),
-}
+TABLE = f"{POPULATION}.csv"
 
 
-def main(results: Path) -> None:
-    runs, problems = load_runs(results, STUDY)
-    for name, text in TEXTS.items():
-        path = results / POPULATION / name
-        path.write_text(text(runs) + "\n", encoding="utf-8")
-        print(path)
+def main(results: Path, *others: Path) -> None:
+    """Raises StudyError for rows of different code."""
+    known = pd.concat([pd.DataFrame(columns=KEY), *(pd.read_csv(other / TABLE) for other in others)])
+    there = set(known[KEY].itertuples(index=False, name=None))
+    missing = tuple(case for case in STUDY.cases if key(case) not in there)
+    runs, problems = load_runs(results, replace(STUDY, cases=missing))
+    rows = merged([known, rows_of(runs, STUDY.columns)], STUDY.cases)
+    pairs = [pairs_of(runs), *(pd.read_csv(other / PAIRS) for other in others)]
+    folder, every = results / POPULATION, groups(rows, STUDY.cases)
+    folder.mkdir(parents=True, exist_ok=True)
+    rows.to_csv(folder / TABLE, index=False, float_format="%.6g")
+    pd.concat(pairs).drop_duplicates("scene").to_csv(folder / PAIRS, index=False, float_format="%.4g")
+    (folder / "population.md").write_text(members_of(every) + "\n", encoding="utf-8")
+    write(every, folder)
+    print(folder, f"{rows['scene'].nunique()} members", sep="\n")
     print(*problems, sep="\n", file=sys.stderr)
 
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(prog="python -m studies.lab.population", description=__doc__)
     parser.add_argument("results", type=Path, nargs="?", default=Path("results"))
-    main(parser.parse_args().results)
+    parser.add_argument("folders", type=Path, nargs="*")
+    given = parser.parse_args()
+    try:
+        main(given.results, *given.folders)
+    except StudyError as problem:
+        sys.exit(f"population: {problem}")

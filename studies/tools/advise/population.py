@@ -8,9 +8,8 @@ import pandas as pd
 
 from massspring import ImplicitVolume
 from studies.base.errors import StudyError
-from studies.metrics.distribution import BOUND, Distribution, distribution
+from studies.metrics.distribution import BOUND, Distribution, distribution_of
 from studies.metrics.judged import DISPLACEMENT, FORCE
-from studies.metrics.metric import Metric
 from studies.metrics.wish import Wish, usual_wish
 from studies.runs.case import Case
 from studies.runs.recipe_text import recipe_text
@@ -18,7 +17,6 @@ from studies.runs.recipes import QuadraticBody
 from studies.scene.kind import has_wall, load_of
 from studies.scene.scene import Scene
 from studies.scene.tissues import TISSUES
-from studies.store.record import Status
 from studies.tools.advise.campaign import PUBLISHED, published_for
 
 PROBED = {"liver": False, "kidney": False, "stomach": True}
@@ -27,6 +25,8 @@ LOADED = {"spleen": "hanging", "bladder": "filled"}
 """Other organs of the population and their load; the rest are under a probe."""
 SIZES, SPEED = (994, 1194, 1594), "real_time [s/s]"
 """Surface nodes of the adaptive bodies that run in it; column of their simulated over computing time."""
+OTHER_MASS = {"heavy": "stiffness", "stiffness": "heavy"}
+"""Two masses whose bodies end within a tenth of the targets of each other (docs/accuracy.md)."""
 POPULATION = "population"
 """Folder and table of the study of random organs, which studies/lab/population draws."""
 
@@ -41,9 +41,8 @@ class Unseen:
     where: str
     cost: float = float("nan")
     """Median of computing over simulated time [1]."""
-    lighter: bool = False
-    """Whether the body had masses by stiffness where the recipe has heavy ones, which end within a tenth of the targets
-    of it (docs/accuracy.md)."""
+    mass: str = ""
+    """That of the members where the recipe has the other one of OTHER_MASS."""
 
     def meets(self, wish: Wish) -> bool:
         """Whether 95 of 100 members do."""
@@ -67,10 +66,7 @@ def unseen(results: Path, case: Case) -> Unseen | None:
     scene, organ = case.scene, case.scene.organ.shape
     if organ == "file" and load_of(scene) == "probe":
         organ = drawn_for(scene, next((name for name, tissue in TISSUES.items() if tissue == scene.tissue), ""))
-    heavy = case.body.mass == "heavy"
-    same = replace(case, body=replace(case.body, mass="stiffness")) if heavy else case
-    found = _unseen(results, recipe_text(same), organ)
-    return found and replace(found, lighter=heavy)
+    return _unseen(results, case, organ)
 
 
 def drawn_for(scene: Scene, tissue: str) -> str:
@@ -90,7 +86,7 @@ def supported(results: Path, scene: Scene, tissue: str) -> tuple[Case, Unseen] |
     for nodes in SIZES:
         body = QuadraticBody(nodes, graded="adaptive", mass="stiffness")
         case = Case(scene, body, ImplicitVolume(), dt_fraction=0.8)
-        sample = _unseen(results, recipe_text(case), organ)
+        sample = _unseen(results, case, organ)
         if sample is not None:
             best = case, sample
             if sample.meets(usual_wish(scene)):
@@ -98,7 +94,15 @@ def supported(results: Path, scene: Scene, tissue: str) -> tuple[Case, Unseen] |
     return best
 
 
-def _unseen(results: Path, recipe: str, organ: str) -> Unseen | None:
+def _unseen(results: Path, case: Case, organ: str) -> Unseen | None:
+    found = _with_recipe(results, recipe_text(case), organ)
+    if found is None and (mass := OTHER_MASS.get(case.body.mass)):
+        found = _with_recipe(results, recipe_text(replace(case, body=replace(case.body, mass=mass))), organ)
+        found = found and replace(found, mass=mass)
+    return found
+
+
+def _with_recipe(results: Path, recipe: str, organ: str) -> Unseen | None:
     roots = (results, results / PUBLISHED, published_for(results))
     tables = [root / POPULATION / f"{POPULATION}.csv" for root in roots]
     path = next((table for table in tables if table.is_file()), None)
@@ -107,7 +111,7 @@ def _unseen(results: Path, recipe: str, organ: str) -> Unseen | None:
     try:
         rows = pd.read_csv(path)
         rows = rows.loc[(rows["scene"].map(organ_of) == organ) & (rows["recipe"] == recipe)]
-        force, displacement = (_of(rows, entry) for entry in (FORCE, DISPLACEMENT))
+        force, displacement = (distribution_of(rows, entry) for entry in (FORCE, DISPLACEMENT))
         cost = 1.0 / rows[SPEED].median() if SPEED in rows else float("nan")
     except (KeyError, ValueError, OSError) as error:
         raise StudyError(
@@ -122,15 +126,6 @@ def organ_of(name: str) -> str | None:
     return found[1] if found else None
 
 
-def _of(rows: pd.DataFrame, entry: Metric) -> Distribution:
-    """Of a column; what ended badly counts as lost."""
-    column = f"{entry.name} [{entry.unit}]"
-    values = rows[column].where(rows["status"] == Status.OK)
-    floors = rows[f"{entry.name} floor [{entry.unit}]"]
-    names = [str(name) for name in rows["scene"]]
-    return distribution(dict(zip(names, values, strict=True)), dict(zip(names, floors, strict=True)))
-
-
 def words(sample: Unseen) -> str:
     """ "on 40 other organs (liver, under a probe) the median force error is 1.2 %, 95 % are below 8 %, ..."."""
 
@@ -143,6 +138,6 @@ def words(sample: Unseen) -> str:
     pairs = (("force", sample.force), ("displacement", sample.displacement))
     errors = [bound(name, one) for name, one in pairs if one.count]
     lost = f", {sample.displacement.lost} more failed" if sample.displacement.lost else ""
-    light = ", masses by stiffness" if sample.lighter else ""
+    mass = {"": "", "stiffness": ", masses by stiffness", "heavy": ", heavy masses"}[sample.mass]
     kind = f"{sample.organ}, {LOADED.get(sample.organ, 'under a probe')}"
-    return f"on {sample.displacement.count} other organs ({kind}{light}{lost}) {', '.join(errors)}"
+    return f"on {sample.displacement.count} other organs ({kind}{mass}{lost}) {', '.join(errors)}"

@@ -11,7 +11,7 @@ import pandas as pd
 import pytest
 
 from massspring import Plane
-from studies import Case, QuadraticBody, Status
+from studies import Case, QuadraticBody, Status, StudyError
 from studies.geometry import organ
 from studies.lab.population.charts import figure, front
 from studies.lab.population.draw import Population, member
@@ -25,8 +25,9 @@ from studies.lab.population.intervals import (
     rule_of,
 )
 from studies.lab.population.ranges import RANGES, SQUEEZE, Filling, Palpation, Sagging
-from studies.lab.population.study import population_study
-from studies.lab.population.tables import members_of, rigid_share, worst_of
+from studies.lab.population.rows import CODE, groups, merged, rows_of
+from studies.lab.population.study import STUDY, population_study
+from studies.lab.population.tables import members_of
 from studies.metrics.interval import RULE_FILE, bound
 from studies.scene.as_json import scene_from_dict, scene_to_json
 from studies.scene.kind import load_of
@@ -147,20 +148,6 @@ def shifted(x):
     return bend(x) + np.array([0.0, 6e-3, 0.0])
 
 
-def squeezed(x):
-    return bend(x) + 2e-3 * (x - x.mean(axis=0)) * [1.0, 0.0, 0.0]
-
-
-@pytest.mark.usefixtures("_flat_facets")
-def test_a_rigid_motion_explains_itself_and_nothing_of_a_strain():
-    strain = made(0, FINE, squeezed)
-    assert rigid_share(made(0, FINE, shifted)) == pytest.approx(100.0, abs=0.2)  # triangles lean one way
-    assert rigid_share(strain) == pytest.approx(0.0, abs=0.2)
-    size = np.sqrt(np.average((strain.boundary_errors.wrong**2).sum(axis=1), weights=strain.boundary_errors.areas))
-    both = made(0, FINE, lambda x: squeezed(x) + np.array([0.0, 0.0, size]))
-    assert rigid_share(both) == pytest.approx(50.0, abs=0.2), "a shift and a strain of equal square mean"
-
-
 @pytest.mark.usefixtures("_flat_facets")
 def test_pairs_have_what_two_meshes_show_and_the_errors_of_both():
     runs = [made(0, FINE), made(0, COARSE, shifted, force=2.2), made(1, FINE), made(2, COARSE, status=Status.FOLDED)]
@@ -238,14 +225,45 @@ def test_the_rule_is_that_of_the_published_members_and_holds_on_organs_left_out(
     assert (PUBLISHED / "intervals.md").read_text(encoding="utf-8") == intervals_of(pairs) + "\n"
 
 
-@pytest.mark.usefixtures("_flat_facets")
-def test_the_worst_come_first_the_lost_are_named_and_what_is_not_compared_is_a_dash():
-    runs = [made(0, FINE), made(1, FINE, shifted), made(2, FINE, status=Status.INVERTED)]
-    rows = worst_of(runs).splitlines()[2:]
-    assert [row.split(" | ")[0][2:] for row in rows] == ["liver_0_001", "liver_0_000", "liver_0_002"]
-    assert "| inverted |" in rows[2]
-    quantities = ("surface", "volume")
-    still = [replace(one, case=replace(one.case, scene=replace(one.case.scene, quantities=quantities))) for one in runs]
-    assert "| 2, 1 | – | – | – | " in members_of(still).splitlines()[-1]
-    for draw in (figure, front):
-        assert len(draw(runs).axes) > 0
+@pytest.fixture
+def runs(_flat_facets):
+    """Of three members, the last of which is lost."""
+    three = [made(0, FINE), made(1, FINE, shifted), made(2, FINE, status=Status.INVERTED)]
+    for one in three:
+        one.reference.record = one.record
+    return three
+
+
+def table_of(runs):
+    return rows_of(runs, STUDY.columns)
+
+
+def test_the_lost_are_counted_and_what_is_not_compared_is_a_dash(runs):
+    still = [
+        replace(one, case=replace(one.case, scene=replace(one.case.scene, quantities=("surface", "volume"))))
+        for one in runs
+    ]
+    for some, words in ((runs, "| 2, 1 | +0 (+0 to +0) | 0 "), (still, "| 2, 1 | – | – | – | ")):
+        every = groups(table_of(some), [one.case for one in some])
+        assert words in members_of(every).splitlines()[-1] and "(liver_0_001)" in members_of(every)
+        for draw in (figure, front):
+            assert len(draw(every).axes) > 0
+
+
+def test_rows_of_two_machines_are_those_of_one(runs, tmp_path):
+    """In the order of the cases; what both have is there once."""
+    whole, cases = table_of(runs), [one.case for one in runs]
+    table_of([runs[2], runs[1]]).to_csv(tmp_path / "rows.csv", index=False, float_format="%.6g")
+    both = merged([pd.read_csv(tmp_path / "rows.csv"), table_of(runs[:2])], cases)
+    assert members_of(groups(both, cases)) == members_of(groups(whole, cases))
+    assert list(both["scene"]) == list(whole["scene"])
+    assert len(merged([whole], cases[:1])) == 1, "rows of no case of the study are left out"
+
+
+@pytest.mark.parametrize("other", ["99999999+{1}", "{0}+99999999"])
+def test_rows_of_another_code_are_refused(runs, other):
+    """Of the run, or of its reference."""
+    rows = table_of(runs[1:])
+    rows[CODE] = [other.format(*code.split("+")) for code in rows[CODE]]
+    with pytest.raises(StudyError, match=r"different code made the rows of liver_0_000 .* and liver_0_001"):
+        merged([table_of(runs[:1]), rows], [one.case for one in runs])

@@ -53,6 +53,13 @@ def test_of_a_heavy_body_the_lighter_one_is_told_as_that(no_tables, tmp_path):
     assert "masses" not in words(unseen(tmp_path, light))
 
 
+def test_of_two_masses_that_of_the_recipe_counts_and_the_other_where_it_never_ran(no_tables, tmp_path):
+    light, heavy = (replace(CASE, body=replace(CASE.body, mass=mass)) for mass in ("stiffness", "heavy"))
+    table(tmp_path / "population" / "population.csv", heavy)
+    assert "heavy masses" in words(unseen(tmp_path, light)) and "masses" not in words(unseen(tmp_path, heavy))
+    assert unseen(tmp_path, replace(CASE, body=replace(CASE.body, mass="lumped"))) is None
+
+
 def test_without_runs_on_the_population_there_is_no_summary(no_tables, tmp_path):
     assert unseen(tmp_path, CASE) is None
     table(tmp_path / "population" / "population.csv")
