@@ -10,8 +10,8 @@ def counted(number: int, one: str, several: str | None = None) -> str:
 
 
 def amounts(kinds: Counter[str]) -> str:
-    """ "3 cases, 6 reference solutions, 1 timing", of the kinds of a plan: never a sum of them."""
-    words = {"case": "case", "reference": "reference solution", "timing": "timing"}
+    """ "3 cases, 6 reference solutions, 9 published references, 1 timing", by kind: never a sum."""
+    words = {"case": "case", "reference": "reference solution", "copy": "published reference", "timing": "timing"}
     return ", ".join(counted(kinds[kind], word) for kind, word in words.items() if kinds[kind])
 
 

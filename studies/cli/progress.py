@@ -15,7 +15,7 @@ from studies.base.doing import Doing, hearing
 from studies.base.interrupts import stop_if_pressed
 from studies.cli.terminal import QUIET_SECONDS, beating, busy
 from studies.store.entry import MISSING
-from studies.sweep.plan import Planned, expected, kind_of
+from studies.sweep.plan import COPY, Planned, expected, kind_of
 
 
 def words(seconds: float) -> str:
@@ -146,10 +146,11 @@ def dry_run(console: Console, study: str, planned: list[Planned], jobs: int) -> 
 
 def basis(planned: list[Planned]) -> str:
     """Where an estimate comes from: "from earlier runs of 3 cases, from the rate of another machine for 2 timings"."""
+    solved = [piece for piece in planned if piece.kind != COPY]
     sources = {
-        "from earlier runs of": [piece for piece in planned if piece.seconds is not None],
-        "from the rate of this machine for": [p for p in planned if p.seconds is None and p.here],
-        "from the rate of another machine for": [p for p in planned if p.seconds is None and not p.here],
+        "from earlier runs of": [piece for piece in solved if piece.seconds is not None],
+        "from the rate of this machine for": [p for p in solved if p.seconds is None and p.here],
+        "from the rate of another machine for": [p for p in solved if p.seconds is None and not p.here],
     }
     kinds = {source: Counter(piece.kind for piece in pieces) for source, pieces in sources.items() if pieces}
-    return ", ".join(f"{source} {amounts(count)}" for source, count in kinds.items())
+    return ", ".join(f"{source} {amounts(count)}" for source, count in kinds.items()) or "only copies"

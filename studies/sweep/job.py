@@ -145,7 +145,7 @@ class ReferenceJob(Job):
     kind = "reference"
 
     @cached_property
-    def _published(self) -> Entry | None:
+    def published(self) -> Entry | None:
         return published(self.work.scene)
 
     @property
@@ -154,11 +154,11 @@ class ReferenceJob(Job):
 
     @property
     def weight(self) -> float:
-        return 1e9 + (0.0 if self._published else unknowns(self.work))
+        return 1e9 + (0.0 if self.published else unknowns(self.work))
 
     @property
     def seconds(self) -> float:
-        return 0.0 if self._published else solve_seconds(self.work)
+        return 0.0 if self.published else solve_seconds(self.work)
 
     @property
     def fingerprint(self) -> str:
@@ -166,8 +166,8 @@ class ReferenceJob(Job):
 
     def run(self) -> Path:
         """A mesh that cannot be made is stored as a failure: it costs its scene, not the sweep."""
-        if self._published is not None:
-            write_record(self.path, record_of(self.work.scene, self._published))
+        if self.published is not None:
+            write_record(self.path, record_of(self.work.scene, self.published))
             return self.path
         from studies.reference.solve import solve
 

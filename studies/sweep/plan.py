@@ -10,12 +10,14 @@ from studies.store.ledger import Ledger
 from studies.store.machine import machine_id
 from studies.sweep.estimate import SECONDS_PER_UNKNOWN, timing_seconds
 from studies.sweep.frame_times import timed_again
-from studies.sweep.job import REFERENCE, CaseJob, Job, case_jobs, jobs_of
+from studies.sweep.job import REFERENCE, CaseJob, Job, ReferenceJob, case_jobs, jobs_of
 
 PHYSICS, TIMING = "physics", "timing"
 """The stages: the first in several processes, the second alone."""
 COPIED = "published "
 """How the fingerprint of a reference begins that was copied (studies.reference.published.fingerprint_of)."""
+COPY = "copy"
+"""Kind of a published reference, which is copied and not solved."""
 AGAIN = "asked for again"
 """Why stored cases are timed though their times are current."""
 
@@ -27,7 +29,7 @@ class Planned:
     stage: str
     """PHYSICS or TIMING."""
     kind: str
-    """ "reference", "case" or "timing"."""
+    """ "reference", COPY, "case" or "timing"."""
     label: str
     why: str
     seconds: float | None
@@ -85,7 +87,8 @@ def rates(ledger: Ledger, jobs: Sequence[Job]) -> dict[str, float]:
 def _of_job(ledger: Ledger, job: Job, measured: Mapping[str, float]) -> Planned:
     why, seconds = ledger.why(job) or "its result failed", _seconds(ledger.entry(job))
     guess = 0.0 if seconds is not None else job.seconds * measured.get(job.kind, 1.0)
-    return Planned(PHYSICS, job.kind, job.label, why, seconds, guess, job.kind in measured)
+    kind = COPY if isinstance(job, ReferenceJob) and job.published else job.kind
+    return Planned(PHYSICS, kind, job.label, why, seconds, guess, kind in measured)
 
 
 def _of_timing(ledger: Ledger, job: CaseJob, why: str, measured: Mapping[str, float]) -> Planned:

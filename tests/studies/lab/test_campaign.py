@@ -12,8 +12,10 @@ import pytest
 from studies import StudyError
 from studies.lab.campaign import __main__ as command
 from studies.lab.campaign import outcome
-from studies.lab.campaign.draw import CLEAR, END, LOADS, MOST, member
+from studies.lab.campaign.draw import BEHIND, CLEAR, END, FILLED, LOADS, MOST, PRESS, PULL, member
 from studies.lab.campaign.outcome import Outcome
+from studies.lab.population.ranges import SQUEEZE
+from studies.metrics.load_size import LARGEST
 from studies.runs.indicators import remarks
 from studies.scene.checks import check_scene, surface_of
 from tests.studies.made_up_run import ATTRIBUTES, SCENE, run
@@ -144,3 +146,9 @@ def test_a_member_that_takes_too_long_or_crashes_is_named_with_what_it_had_found
     assert lines.count("members that did not end: 2 of 2") == 2 and "| all | 0 | 0 | 0 | 2 |" in "\n".join(lines)
     assert [line[-17:] for line in lines if line.startswith("  2: ")] == ["stopped after 1 s"] * 2
     assert [line[-25:] for line in lines if line.startswith("  3: ")] == ["its process ended with -9"] * 2
+
+
+def test_loads_are_called_measured_up_to_the_largest_that_are_drawn():
+    planes, tools, pulls, _, fills = LARGEST.values()
+    assert planes == max(PRESS[1], SQUEEZE[1]) and tools == BEHIND and pulls == PULL[1]
+    assert fills == pytest.approx(FILLED[1] - 1.0)

@@ -1,20 +1,24 @@
 """What a sweep would run is what it runs; how long it takes is read off what ran before; compiling is reported."""
 
 import re
+from collections import Counter
 from dataclasses import replace
 from functools import partial
 
 import numba
 import pytest
 
+from studies.base.counting import amounts
 from studies.base.processes import run_each
+from studies.cli.progress import basis
 from studies.metrics.timing.cases import timing_file
 from studies.runs.current import case_path
+from studies.scene.library import SCENES
 from studies.store.entry import CODE_CHANGED, MISSING
 from studies.store.ledger import Ledger
 from studies.store.record import peek, read_record, write_record
 from studies.sweep.local import begin
-from studies.sweep.plan import PHYSICS, TIMING, Planned, expected, plan
+from studies.sweep.plan import COPY, PHYSICS, TIMING, Planned, expected, plan
 from studies.sweep.run_studies import run_studies
 from studies.sweep.standings import failed
 from tests.studies.tiny import Silent, diverging_case, tiny_case, tiny_study
@@ -83,6 +87,14 @@ def test_a_dry_run_says_it_all_and_runs_nothing(organbench, tiny_file, results, 
     assert "with 2 processes, from earlier runs of 1 case; compiling comes on top" in out
     code, out, _ = organbench("run", tiny_file, "--dry-run", "--only", "failed", "--results", results)
     assert out.strip() == "tiny: nothing would run: all results are current"
+
+
+def test_a_published_reference_is_copied_and_has_no_rate(tmp_path):
+    study = tiny_study(cases=(tiny_case(scene=SCENES[0]),))
+    pieces = plan(Ledger(tmp_path), study)
+    assert [piece.kind for piece in pieces][:2] == [COPY, "case"] and expected(pieces[:1], 1) == 0.0
+    assert basis(pieces) == "from the rate of another machine for 1 case" and basis(pieces[:1]) == "only copies"
+    assert amounts(Counter(piece.kind for piece in pieces)).startswith("1 case, 1 published reference")
 
 
 def compile_something(task):
