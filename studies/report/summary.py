@@ -20,6 +20,7 @@ from studies.metrics.table import FEW_FACETS, UNCONVERGED, UNRESOLVED, marked, s
 from studies.metrics.wish import Wish, usual_wish
 from studies.runs.recipe_text import body_words
 from studies.scene.scene import Scene
+from studies.store.record import Status
 
 PAPER = 550
 """Surface nodes of the paper's body where it is compared with others."""
@@ -40,7 +41,8 @@ def results_of(runs: Sequence[Run]) -> str:
     ]
     for row in rows.to_dict("records"):
         cells = [_cell(row, name) for name in SUMMARY_HEADS]
-        lines.append(f"| {row['scene']} | {row['body']} | {marked(row)} | " + " | ".join(cells) + " |")
+        status = "" if row["status"] == Status.OK else f" (*{row['status']}*)"
+        lines.append(f"| {row['scene']} | {row['body']} | {marked(row)}{status} | " + " | ".join(cells) + " |")
     if any(UNRESOLVED_MARK in line for line in lines):
         lines += ["", UNRESOLVED_NOTE]
     if rows[UNCONVERGED].any():

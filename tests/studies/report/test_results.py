@@ -82,6 +82,8 @@ def test_fine_steps_are_no_headline_and_a_case_that_failed_is_a_dash(finished_sw
     assert headline([replace(runs[0], record=fine), runs[1]]) == headline([runs[1]])
     failed = replace(record, attributes={}, fields={}, status=Status.FAILED)
     assert headline([replace(runs[0], record=failed)])[0][3:] == ["–"] * 8
+    folded = replace(record, status=Status.FOLDED)
+    assert headline([replace(runs[0], record=folded)])[0][2] == headline([runs[0]])[0][2] + " (*folded*)"
     assert "make study" in results_of([])
 
 

@@ -60,19 +60,14 @@ def published_statuses(study: Study) -> set[str]:
 
 
 def test_the_catalogue_expects_what_it_has_published():
-    """No published case ends as its study does not expect. What a study expects does happen: 60 cases of the stability
-    map diverged, 19 recoveries ended inverted, hanging spleens in accuracy, organs and literature did. Only recoveries,
-    whose starts are meant to break a method, may also end in ways that no published case did. The table of
-    work_precision has no least J, but cases of accuracy that fold."""
+    """No published case ends as its study does not expect, and what a study expects does happen: 60 cases of the
+    stability map diverged, recoveries ended inverted or shaken, hanging spleens in accuracy, organs and literature
+    inverted. The table of work_precision has no least J, but cases of accuracy that fold."""
     published = {study.name: published_statuses(study) for study in STUDIES}
     assert all(study.accepts(status) for study in STUDIES for status in published[study.name])
     expected = {study.name: set(study.expects) for study in STUDIES if study.expects}
-    assert expected.keys() == {
-        *("stability_map", "stress", "accuracy", "organs", "literature", "laws", "cutting", "volume_loss"),
-        "work_precision",
-    }
+    assert expected.keys() == {study.name for study in STUDIES} - {"frame_rate", "methods"}
     assert expected.pop("work_precision") == {"folded"}
-    assert expected.pop("stress") - published["stress"] == {"diverged", "drifted"}
     for name, statuses in expected.items():
         assert statuses == published[name] - {"ok", "skipped"}
 
