@@ -32,8 +32,9 @@ def main(results: Path, *others: Path) -> None:
     pd.concat(pairs).drop_duplicates("scene").to_csv(folder / PAIRS, index=False, float_format="%.4g")
     (folder / "population.md").write_text(members_of(every) + "\n", encoding="utf-8")
     write(every, folder)
-    print(folder, f"{rows['scene'].nunique()} members", sep="\n")
-    print(*problems, sep="\n", file=sys.stderr)
+    ran = set(rows["scene"])
+    print(folder, f"{len(ran)} of {len(STUDY.scenes)} members", sep="\n")
+    print(*(problem for problem in problems if any(name in problem for name in ran)), sep="\n", file=sys.stderr)
 
 
 if __name__ == "__main__":
