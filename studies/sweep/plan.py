@@ -86,9 +86,10 @@ def rates(ledger: Ledger, jobs: Sequence[Job]) -> dict[str, float]:
 
 def _of_job(ledger: Ledger, job: Job, measured: Mapping[str, float]) -> Planned:
     why, seconds = ledger.why(job) or "its result failed", _seconds(ledger.entry(job))
+    if isinstance(job, ReferenceJob) and job.published:
+        return Planned(PHYSICS, COPY, job.label, why, 0.0)  # stored seconds are those of whoever solved it
     guess = 0.0 if seconds is not None else job.seconds * measured.get(job.kind, 1.0)
-    kind = COPY if isinstance(job, ReferenceJob) and job.published else job.kind
-    return Planned(PHYSICS, kind, job.label, why, seconds, guess, kind in measured)
+    return Planned(PHYSICS, job.kind, job.label, why, seconds, guess, job.kind in measured)
 
 
 def _of_timing(ledger: Ledger, job: CaseJob, why: str, measured: Mapping[str, float]) -> Planned:

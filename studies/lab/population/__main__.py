@@ -19,13 +19,18 @@ TABLE = f"{POPULATION}.csv"
 
 
 def main(results: Path, *others: Path) -> None:
-    """Raises StudyError for rows of different code."""
+    """Raises StudyError where no member has run, and for a FOLDER without the tables of one code."""
+    for other in others:
+        if not all((other / name).is_file() for name in (TABLE, PAIRS)):
+            raise StudyError(f"{other} has no {TABLE} and {PAIRS}; give a folder that this command wrote")
     known = pd.concat([pd.DataFrame(columns=KEY), *(pd.read_csv(other / TABLE) for other in others)])
     there = set(known[KEY].itertuples(index=False, name=None))
     missing = tuple(case for case in STUDY.cases if key(case) not in there)
     runs, problems = load_runs(results, replace(STUDY, cases=missing))
+    if not runs and known.empty:
+        raise StudyError(f"no random organ has run in {results}; organbench run studies/lab/population/study.py")
     rows = merged([known, rows_of(runs, STUDY.columns)], STUDY.cases)
-    pairs = [pairs_of(runs), *(pd.read_csv(other / PAIRS) for other in others)]
+    pairs = [pd.DataFrame(columns=["scene"]), pairs_of(runs), *(pd.read_csv(other / PAIRS) for other in others)]
     folder, every = results / POPULATION, groups(rows, STUDY.cases)
     folder.mkdir(parents=True, exist_ok=True)
     rows.to_csv(folder / TABLE, index=False, float_format="%.6g")

@@ -135,7 +135,7 @@ def front(groups: Sequence[Group]) -> Figure:
     notes = [
         "Bars: 95 % confidence from resampling the members. Numbers: surface nodes. Green: within the target in real "
         "time. Computing time is that of the first member of each organ.",
-        *_timing_notes(all_groups),
+        *timing_notes(all_groups),
     ]
     return finish(sheet, FRONT, list(handles.values()), notes, columns=3)
 
@@ -146,11 +146,13 @@ def _cost(group: Group) -> float:
     return 1.0 / float(np.median(speeds)) if len(speeds) else float("nan")
 
 
-def _timing_notes(groups: Sequence[Group]) -> list[str]:
+def timing_notes(groups: Sequence[Group]) -> list[str]:
     rows = pd.concat([group.rows for group in groups]).reindex(columns=["scene", PROCESSOR, DISTURBED])
-    disturbed = rows.loc[rows[DISTURBED].fillna("") != "", "scene"]
-    notes = [f"Wall times of {', '.join(names)}."] if len(names := rows[PROCESSOR].dropna().unique()) else []
-    return [*notes, *([f"{DISTURBED_NOTE}: {', '.join(disturbed.unique())}."] if len(disturbed) else [])]
+    texts = rows.astype(object).where(rows.notna(), "")  # a row without a time, or a column that a table lacks
+    names = [name for name in texts[PROCESSOR].unique() if name]
+    disturbed = texts.loc[texts[DISTURBED] != "", "scene"].unique()
+    notes = [f"Wall times of {', '.join(names)}."] if names else []
+    return [*notes, *([f"{DISTURBED_NOTE}: {', '.join(disturbed)}."] if len(disturbed) else [])]
 
 
 def _draw_front(panel: Axes, bodies: Sequence[tuple[float, Group]], entry: Metric) -> dict[str, Line2D]:

@@ -26,9 +26,12 @@ def rows_of(runs: Sequence[Run], columns: Sequence[str | Metric]) -> pd.DataFram
 def merged(tables: Iterable[pd.DataFrame], cases: Iterable[Case]) -> pd.DataFrame:
     """The rows of several tables in the order of `cases`; where two have the same case, that of the first.
 
-    Raises StudyError for rows of one recipe that different codes made: they are no population.
+    Raises StudyError for rows that do not name their code, and for those of one recipe that different codes made: they
+    are no population.
     """
     rows = pd.concat(tables, ignore_index=True).drop_duplicates(KEY)
+    if unnamed := list(rows.loc[rows[CODE].isna() if CODE in rows else slice(None), "scene"]):
+        raise StudyError(f"the row of {unnamed[0]} does not name the code that made it; run the member again")
     order = {key(case): at for at, case in enumerate(cases)}
     rows = rows.assign(at=[order.get(row) for row in rows[KEY].itertuples(index=False, name=None)]).dropna(subset="at")
     rows = rows.sort_values("at", ignore_index=True).drop(columns="at")

@@ -13,7 +13,8 @@ import pytest
 from massspring import Plane
 from studies import Case, QuadraticBody, Status, StudyError
 from studies.geometry import organ
-from studies.lab.population.charts import figure, front
+from studies.lab.population.__main__ import main as tables
+from studies.lab.population.charts import figure, front, timing_notes
 from studies.lab.population.draw import Population, member
 from studies.lab.population.intervals import (
     PAIRS,
@@ -267,3 +268,19 @@ def test_rows_of_another_code_are_refused(runs, other):
     rows[CODE] = [other.format(*code.split("+")) for code in rows[CODE]]
     with pytest.raises(StudyError, match=r"different code made the rows of liver_0_000 .* and liver_0_001"):
         merged([table_of(runs[:1]), rows], [one.case for one in runs])
+    with pytest.raises(StudyError, match=r"the row of liver_0_001 does not name the code"):
+        merged([rows.drop(columns=CODE)], [one.case for one in runs])
+
+
+def test_a_folder_without_members_is_named(tmp_path):
+    with pytest.raises(StudyError, match="no random organ has run in"):
+        tables(tmp_path)
+    with pytest.raises(StudyError, match=r"has no population\.csv and pairs\.csv"):
+        tables(tmp_path, tmp_path)
+
+
+def test_a_chart_names_the_processors_of_the_times_that_there_are(runs):
+    rows = table_of(runs)
+    rows["processor"], rows["disturbed"] = ["", "made up", np.nan], ["", "", np.nan]
+    notes = timing_notes(groups(rows, [one.case for one in runs]))
+    assert notes == ["Wall times of made up."]
