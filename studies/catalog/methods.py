@@ -17,6 +17,7 @@ from studies.runs.case import Case
 from studies.runs.recipes import BodyRecipe, TetrahedralBody
 from studies.scene.library.ball_squeeze import BALL_SQUEEZE
 from studies.scene.library.liver_press import LIVER_PRESS
+from studies.store.schema import Status
 
 NODES = 200
 """So coarse that the dearest, a volume for every tetrahedron, is done in seconds; the same for all."""
@@ -74,6 +75,7 @@ METHODS_STUDY = Study(
             for scene in SCENES
         ),
     ),
+    expects=(Status.SHAKEN,),  # implicit springs on the ball, with steps of 100 ms
     charts=(Chart("methods.png", "studies.plots.methods:draw"),),
     columns=(
         "force_error",

@@ -17,9 +17,9 @@ from studies.metrics.run import Run, by_scene
 from studies.metrics.wish import usual_wish
 from studies.plots.style.families import OUTSIDE, PAPER, Family, family_of
 from studies.plots.style.page import (
-    MOST_NAMED,
     blank,
     finish,
+    first_of,
     log_axis,
     page,
     panels,
@@ -237,8 +237,7 @@ def _left_out(runs: Sequence[Run]) -> list[str]:
     well = [run for run in runs if run.record.status == Status.OK]
     notes = remarks(well)
     if ended:
-        more = f" and {len(ended) - MOST_NAMED} more" if len(ended) > MOST_NAMED else ""
-        notes.append(f"Not drawn, because they failed: {', '.join(ended[:MOST_NAMED])}{more}.")
+        notes.append(f"Not drawn, because they failed: {first_of(ended)}.")
     bodies = [one for group in by_scene(well).values() for one in over_meshes(filter(None, map(judged, group)))]
     untimed = sum(
         not one.cost.known and not is_entry(one.case) for one in bodies

@@ -17,6 +17,7 @@ from studies.metrics.cells import DISTURBED_NOTE, MINUS, UNRESOLVED_MARK
 from studies.metrics.metric import Metric
 from studies.metrics.run import Run, by_scene
 from studies.plots.style.style import BLACK, GREY, SMALL, remark, styled
+from studies.store.record import Status
 
 ROW, LINE, MARGIN = 0.25, 0.19, 0.12
 """Heights of a legend row, of a line of notes, and of the margin around them [inch]."""
@@ -116,13 +117,18 @@ def grouped(runs: Sequence[Run], key: Callable[[Run], object]) -> list[list[Run]
 
 
 def remarks(runs: Sequence[Run]) -> list[str]:
-    """A sentence for each run that broke off, and one on the scenes without a reference."""
+    """A sentence for each run that broke off, one on those that are whole but not ok, and one on the scenes without a
+    reference."""
     ended = [f"{run.case.name}: {run.record.message or run.record.status}." for run in runs if not has_frames(run)]
     ended += [
         f"{run.case.name} {readable(run.record.status)}; shown up to there."
         for run in runs
         if has_frames(run) and good_frames(run) < len(run.fields.t)
     ]
+    whole = [run for run in runs if has_frames(run) and good_frames(run) == len(run.fields.t)]
+    unsound = [f"{run.case.name} {readable(run.record.status)}" for run in whole if run.record.status != Status.OK]
+    if unsound:
+        ended.append(f"Shown, but not ok: {first_of(unsound)}.")
     bare = [name for name, group in by_scene(runs).items() if all(run.reference is None for run in group)]
     missing = [f"No error is shown for {', '.join(map(readable, bare))}, because it has no reference."] if bare else []
     return [*missing, *ended]
@@ -133,13 +139,18 @@ def timing_notes(runs: Sequence[Run]) -> list[str]:
     timed = [(run, run.timing) for run in runs if run.timing is not None]
     names = ", ".join(dict.fromkeys(timing.processor for _, timing in timed if timing.processor))
     shares = [100 * own.sum() / timing.frame_ns.sum() for _, timing in timed if (own := timing.cpu_ns) is not None]
-    ends = f"{min(shares):.0f} to {max(shares):.0f} %" if shares else ""
-    notes = [f"Wall times of {names}; processor time is {ends} of them."] if shares else []
+    ends = " to ".join(dict.fromkeys(f"{end:.0f}" for end in (min(shares), max(shares)))) if shares else ""
+    notes = [f"Wall times of {names}; processor time is {ends} % of them."] if shares else []
     disturbed = [run.case.name for run, timing in timed if timing.disturbed]
     if disturbed:
-        more = f" and {len(disturbed) - MOST_NAMED} more" if len(disturbed) > MOST_NAMED else ""
-        notes.append(f"{DISTURBED_NOTE}: {', '.join(disturbed[:MOST_NAMED])}{more}.")
+        notes.append(f"{DISTURBED_NOTE}: {first_of(disturbed)}.")
     return notes
+
+
+def first_of(names: Sequence[str]) -> str:
+    """The first MOST_NAMED, and how many more."""
+    more = f" and {len(names) - MOST_NAMED} more" if len(names) > MOST_NAMED else ""
+    return ", ".join(names[:MOST_NAMED]) + more
 
 
 def unresolved_notes(runs: Sequence[Run], metrics: Sequence[Metric]) -> list[str]:

@@ -45,6 +45,12 @@ def test_volume_in_per_cent_and_its_size_below():
     assert reference.get_ydata() == pytest.approx(-3e-3 * np.array(BALL_SQUEEZE.checkpoints) / 4.0, rel=1e-6)
 
 
+def test_a_chart_names_a_run_that_it_shows_and_that_is_not_ok():
+    figure = volume_history.figure([run(), run(method=Free(), status=Status.SHAKEN)])
+    assert "Shown, but not ok: ball_squeeze-tetrahedral-550-free-dt0.5 shaken." in words(figure)
+    assert "not ok" not in words(volume_history.figure([run()]))
+
+
 def test_a_diverged_run_ends_where_it_broke_and_does_not_scale_the_axis():
     broken = run(method=Free(), status=Status.DIVERGED, volume_end=1e12)
     figure = volume_history.figure([broken, run(volume_end=-0.05)])

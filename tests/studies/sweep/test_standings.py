@@ -66,7 +66,7 @@ def test_the_catalogue_expects_what_it_has_published():
     published = {study.name: published_statuses(study) for study in STUDIES}
     assert all(study.accepts(status) for study in STUDIES for status in published[study.name])
     expected = {study.name: set(study.expects) for study in STUDIES if study.expects}
-    assert expected.keys() == {study.name for study in STUDIES} - {"frame_rate", "methods"}
+    assert expected.keys() == {study.name for study in STUDIES} - {"frame_rate"}
     assert expected.pop("work_precision") == {"folded"}
     for name, statuses in expected.items():
         assert statuses == published[name] - {"ok", "skipped"}
