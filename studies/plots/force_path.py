@@ -65,7 +65,7 @@ def figure(runs: Sequence[Run]) -> Figure:
         sheet,
         (CUT_TITLE + "," * bool(against) if cut else TITLE) + against,
         handles,
-        [*notes, *unresolved_notes(shown, FORCES), *remarks(runs)],
+        [*notes, *remarks(runs), *unresolved_notes(shown, FORCES)],
         columns=3,
     )
 

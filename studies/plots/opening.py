@@ -60,7 +60,7 @@ def figure(runs: Sequence[Run]) -> Figure:
     handles = [*body_method_handles(shown, looks), reference_handle(linestyle="-", linewidth=1)]
     handles.append(band_handle("± its uncertainty"))
     notes = ["Across the cut along its normal, at the last checkpoint, averaged over stretches of equal depth."]
-    return finish(sheet, TITLE, handles, [*notes, *unresolved_notes(shown, (OPENING,)), *remarks(runs)], columns=3)
+    return finish(sheet, TITLE, handles, [*notes, *remarks(runs), *unresolved_notes(shown, (OPENING,))], columns=3)
 
 
 def _draw_cut(axes: Axes, group: Sequence[Run], number: int, looks: dict[BodyRecipe, BodyLook]) -> None:
