@@ -128,7 +128,7 @@ def remarks(runs: Sequence[Run]) -> list[str]:
     whole = [run for run in runs if has_frames(run) and good_frames(run) == len(run.fields.t)]
     unsound = [f"{run.case.name} {readable(run.record.status)}" for run in whole if run.record.status != Status.OK]
     if unsound:
-        ended.append(f"Shown, but not ok: {first_of(unsound)}.")
+        ended.append(f"Not ok: {first_of(unsound)}.")
     bare = [name for name, group in by_scene(runs).items() if all(run.reference is None for run in group)]
     missing = [f"No error is shown for {', '.join(map(readable, bare))}, because it has no reference."] if bare else []
     return [*missing, *ended]

@@ -25,7 +25,7 @@ SECONDS = 20.0
 DRIFT = 0.01
 """A kept volume this far off has drifted, as in studies.runs."""
 INSIDE = 1e-2
-"""Of the body's size: a node this deep in an obstacle is inside it."""
+"""Of the body's size: a surface this deep in an obstacle has penetrated it."""
 ROUND_OFF = {"float64": 1e-9, "float32": 1e-4}
 """Of the body's size and of its distance from the origin."""
 
@@ -71,7 +71,7 @@ def named(setup: Setup, history: History) -> tuple[str, str]:
         return status, reason
     deepest = float(np.max(history.penetration[-1], initial=0.0))
     if deepest > INSIDE * setup.body.size:
-        return "penetrated", f"a node lies {1e3 * deepest:.3g} mm inside an obstacle"
+        return "penetrated", f"the surface is {1e3 * deepest:.3g} mm deep in an obstacle"
     off = float(np.max(np.abs(history.volume[-1] / history.volume_target[-1] - 1.0)))
     if setup.method.volume_tol is not None and off > DRIFT:
         return "drifted", f"a kept volume ends {100 * off:.3g} % off"
@@ -100,13 +100,23 @@ def broken(setup: Setup, history: History) -> str:
     for number, obstacle in enumerate(setup.obstacles):
         if isinstance(obstacle, Probe):
             continue
-        deepest = max(0.0, -float(obstacle.gap(final[body.surface_nodes], end).min()))
-        record = history.penetration[-1, number]
+        gap, record = obstacle.gap(final, end), float(history.penetration[-1, number])
+        least, most = depths(gap, body.surface_nodes, body.contact_facets)
         # Between nodes a round obstacle may be deeper.
-        off = deepest - max(0.0, float(record))
-        if (abs(off) if isinstance(obstacle, Plane) else off) > allowed:
-            return f"a node is {deepest:.3g} m inside obstacle {number}, the record says {record:.3g} m"
+        if record < least - allowed or (isinstance(obstacle, Plane) and record > most + allowed):
+            return f"a node is {least:.3g} m inside obstacle {number}, the record says {record:.3g} m"
     return ""
+
+
+def depths(gap: np.ndarray, nodes: np.ndarray, curved: np.ndarray) -> tuple[float, float]:
+    """How deep the deepest of the surface `nodes` is in a plane, and how deep the surface is at most, from the `gap` of
+    each node [m], (n,): a curved facet, rows of `curved` (f, 6), lies within its Bézier control points."""
+    least = most = max(0.0, -float(gap[nodes].min()))
+    if len(curved):
+        corners, sides = gap[curved[:, :3]], gap[curved[:, 3:]]
+        middles = 0.5 * (corners + np.roll(corners, -1, axis=1))
+        most = max(most, -float((sides + (sides - middles)).min()))
+    return least, most
 
 
 def run_trials(trials: Iterable[Trial], jobs: int, done: Callable[[Outcome], object]) -> list[Outcome]:

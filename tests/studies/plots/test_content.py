@@ -47,7 +47,7 @@ def test_volume_in_per_cent_and_its_size_below():
 
 def test_a_chart_names_a_run_that_it_shows_and_that_is_not_ok():
     figure = volume_history.figure([run(), run(method=Free(), status=Status.SHAKEN)])
-    assert "Shown, but not ok: ball_squeeze-tetrahedral-550-free-dt0.5 shaken." in words(figure)
+    assert "Not ok: ball_squeeze-tetrahedral-550-free-dt0.5 shaken." in words(figure)
     assert "not ok" not in words(volume_history.figure([run()]))
 
 

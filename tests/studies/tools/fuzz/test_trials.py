@@ -10,7 +10,7 @@ from massspring import Free, MassSpringError, simulate
 from massspring.methods.implicit_volume import ImplicitVolume
 from studies.geometry.mesh.organ_mesh import tetrahedron_volumes
 from studies.tools.fuzz import outcome as module
-from studies.tools.fuzz.outcome import UNEXPLAINED, broken, counts, named, run_trials, table_of, tried
+from studies.tools.fuzz.outcome import UNEXPLAINED, broken, counts, depths, named, run_trials, table_of, tried
 from studies.tools.fuzz.trial import CHOICES, Trial, draw
 from studies.tools.fuzz.world import body_of, mesh_of, setup_of
 
@@ -105,6 +105,18 @@ def test_each_truth_is_missed_by_what_breaks_it(pressed):
     assert named(setup, replace(history, min_j=folded))[0] == "folded"
     assert named(replace(setup, positions=setup.body.rest), replace(history, min_j=folded))[0] == "ok"
     assert named(setup, replace(history, min_j=history.min_j * 0.0))[0] == "inverted"
+
+
+def test_a_curved_facet_is_no_deeper_than_its_control_points():
+    """A facet that bulges towards a plane between nodes that are outside: its deepest point, of many, is between."""
+    gap = np.array([0.01, 0.012, 0.02, 0.001, 0.002, 0.0])
+    b = np.random.default_rng(3).dirichlet(np.ones(3), 10_000)
+    sides = [4.0 * b[:, i] * b[:, j] for i, j in ((0, 1), (1, 2), (2, 0))]
+    deepest = -float((np.column_stack([b * (2.0 * b - 1.0), *sides]) @ gap).min())
+    nodes, facet = np.arange(6), np.arange(6)[None]
+    least, most = depths(gap, nodes, facet)
+    assert least == 0.0 < 0.003 < deepest < most == pytest.approx(0.015)
+    assert depths(gap, nodes, facet[:0]) == (0.0, 0.0)
 
 
 def test_a_method_that_forgets_the_volume_drifts_or_inverts(monkeypatch):
