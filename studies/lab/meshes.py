@@ -20,6 +20,7 @@ import numpy as np
 from studies import STUDIES, Study, StudyError, prepare
 from studies.geometry.mesher import jobs
 from studies.geometry.mesher.shipped import FOLDER, INDEX, OWN, index, key_of, shipped
+from studies.lab.refusal import refusal
 
 Meshes = Mapping[str, tuple[dict[str, Any], Mapping[str, np.ndarray]]]
 """Key of a recipe -> the recipe, the arrays."""
@@ -101,4 +102,5 @@ def main(words: list[str]) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+    with refusal("meshes"):
+        sys.exit(main(sys.argv[1:]))

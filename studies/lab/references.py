@@ -20,6 +20,7 @@ import h5py
 import numpy as np
 
 from studies import Record, Reference, Scene, reference_for, solve_reference
+from studies.lab.refusal import refusal
 from studies.reference.published import FOLDER, INDEX, LENGTHS, PRECISION, index, judged_scenes, physics
 
 MOST, TOLERANCE = 80e3, 0.002
@@ -120,4 +121,5 @@ def main(words: list[str]) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+    with refusal("references"):
+        sys.exit(main(sys.argv[1:]))

@@ -27,6 +27,7 @@ from studies.lab.campaign.draw import MOST, member
 from studies.lab.campaign.outcome import JUDGED, Outcome, judge, told, two_meshes
 from studies.lab.commit import commit
 from studies.lab.population.intervals import PAIRS, pairs_of
+from studies.lab.refusal import refusal
 
 CELLS = [f"{told}, {truth}" for told in ("silent", "doubted") for truth in ("right", "wrong", "far", "undecided")]
 FINE, WORST_FIRST = ("silent, right", "doubted, right", "not ok", "refused"), [*CELLS, "crashed"]
@@ -140,4 +141,5 @@ def main(words: list[str]) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+    with refusal("campaign"):
+        sys.exit(main(sys.argv[1:]))

@@ -15,6 +15,7 @@ from studies import SCENES, Status, read_record
 from studies.exchange.league import LEAGUE, SET, frozen
 from studies.lab.league.programs import OURS, PROGRAMS, TIME_LIMIT, Program, Surroundings, entered
 from studies.lab.league.sweep import NODES, swept
+from studies.lab.refusal import refusal
 
 TABLE = "sweep.csv"
 
@@ -80,4 +81,5 @@ def write_sweep(table: Path, programs: list[Program], at: Surroundings) -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with refusal("league"):
+        main()

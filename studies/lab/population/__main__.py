@@ -14,6 +14,7 @@ from studies.lab.population.intervals import PAIRS, pairs_of
 from studies.lab.population.rows import KEY, groups, key, merged, rows_of
 from studies.lab.population.study import POPULATION, STUDY
 from studies.lab.population.tables import members_of
+from studies.lab.refusal import refusal
 
 TABLE = f"{POPULATION}.csv"
 
@@ -47,7 +48,5 @@ if __name__ == "__main__":
     parser.add_argument("results", type=Path, nargs="?", default=Path("results"))
     parser.add_argument("folders", type=Path, nargs="*")
     given = parser.parse_args()
-    try:
+    with refusal("population"):
         main(given.results, *given.folders)
-    except StudyError as problem:
-        sys.exit(f"population: {problem}")

@@ -13,6 +13,7 @@ from pathlib import Path
 
 from studies import STUDIES, StudyError
 from studies.lab.publish.kept_volume import kept_volumes
+from studies.lab.refusal import refusal
 
 PUBLISHED = Path("results/published")
 """The only part of results/ that git keeps."""
@@ -117,7 +118,5 @@ def _organbench(*words: str) -> None:
 
 
 if __name__ == "__main__":
-    try:
+    with refusal("publish"):
         main()
-    except StudyError as problem:
-        sys.exit(f"publish: {problem}")

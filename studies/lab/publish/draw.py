@@ -15,6 +15,7 @@ from tempfile import TemporaryDirectory
 import pandas as pd
 
 from studies import METRICS, STUDIES, Case, Study, StudyError, load_runs, run_studies, study_table
+from studies.lab.refusal import refusal
 
 PUBLISHED = Path("results/published")
 SAME = ["scene", "body", "law", "nodes", "stiffness", "method"]
@@ -121,7 +122,5 @@ def apart(now: float, was: float) -> float:
 
 
 if __name__ == "__main__":
-    try:
+    with refusal("draw"):
         sys.exit(main())
-    except StudyError as problem:
-        sys.exit(f"draw: {problem}")

@@ -12,6 +12,7 @@ from studies import STUDIES, StudyError, load_runs, study_table
 from studies.lab.publish import __main__ as publishing
 from studies.lab.publish import draw
 from studies.lab.publish.kept_volume import kept_volumes, promised, worst_volume
+from studies.lab.refusal import refusal
 from studies.runs.current import case_path
 from studies.store.record import read_record, write_record
 from tests.studies.tiny import SQUEEZE, diverging_case, tiny_case, tiny_study
@@ -87,3 +88,9 @@ def test_the_table_is_read_off_the_stored_runs(results):
     assert kept_volumes(results, [study])["at most 1e-4"].tolist() == ["NO"]
     assert kept_volumes(results / "nowhere", [study]).empty
     assert kept_volumes(results, [tiny_study(cases=(diverging_case(),))]).empty
+
+
+def test_a_refused_command_of_the_lab_ends_with_its_sentence_and_two(capsys):
+    with pytest.raises(SystemExit) as stop, refusal("publish"):
+        raise StudyError("nothing makes 'x'")
+    assert (stop.value.code, capsys.readouterr().err) == (2, "publish: nothing makes 'x'\n")
