@@ -47,6 +47,7 @@ publish: setup-verify compiled ## all that is published, again, by this machine 
 	$(MAKE) fuzz
 	$(BIN)/python -m studies.lab.league --sweep
 	$(BIN)/python -m studies.lab.league
+	$(BIN)/python -m studies.lab.silicone --programs
 	$(BIN)/python -m studies.lab.silicone cylinder_press --programs
 	$(BIN)/python -m studies.lab.publish
 	$(BIN)/python -m studies.lab.methods_page

@@ -12,12 +12,11 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from studies import STUDIES, StudyError
-from studies.lab.publish.kept_volume import kept_volumes
 from studies.lab.refusal import refusal
 
 PUBLISHED = Path("results/published")
 """The only part of results/ that git keeps."""
-POPULATION, KEPT = "population", "kept_volume.csv"
+POPULATION = "population"
 EXTRAS = {
     POPULATION: "organbench run studies/lab/population/study.py",
     "league": "make study-league",
@@ -26,7 +25,6 @@ EXTRAS = {
     "silicone": "python -m studies.lab.silicone",
     "breaking": "organbench fuzz --cases 10000",
     "reference": "organbench report",
-    KEPT: "organbench run",
     "summary.md": "organbench report",
     "machine.json": "organbench report",
 }
@@ -56,13 +54,11 @@ def publish(results: Path, names: Sequence[str], target: Path) -> list[Path]:
         if name not in (*catalogue, *EXTRAS):
             raise StudyError(f"nothing makes '{name}'; give a study, or one of {', '.join(EXTRAS)}")
     known = [name for name in (*catalogue, *EXTRAS) if files_of(results, name)]
-    chosen = names or [*known, KEPT]
+    chosen = names or known
     studies = [name for name in chosen if name in catalogue]
     if studies:
         _organbench("run", *studies, "--results", str(results))
     _organbench("report", "--results", str(results))
-    if KEPT in chosen:
-        kept_volumes(results, STUDIES).to_csv(results / KEPT, index=False, float_format="%.6g")
     copies = []
     for name in chosen:
         files = files_of(results, name)
