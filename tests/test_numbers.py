@@ -355,7 +355,8 @@ ROWS = [
         "step, and in the volume error, # to # %. One volume per tetrahedron locks: the force is # to # % too large.",
         ways),
     (FINDINGS, "at full load is # to # % too small under each of the # laws that allow one volume (# of # runs are "
-        "*inverted* and not counted). One volume per node with cotangent springs brings the error along the path to # % at # surface nodes", laws),
+        "*inverted* and not counted). One volume per node with cotangent springs brings the error along the path to # "
+        "% at # surface nodes", laws),
     (FINDINGS, "on ball_clamped its force is # % off at # times real time. Where the organ turns, both linear methods "
         "miss the force by # to # %.", literature),
     (FINDINGS, "with one volume from # of # (not from the start *@*), with springs alone from #, with nodal volumes "
