@@ -6,7 +6,7 @@ from setuptools import setup
 from setuptools.command.build_py import build_py
 
 PUBLISHED = Path("results/published")
-TABLES = ("accuracy/accuracy.csv", "population/population.csv")
+TABLES = ("accuracy/accuracy.csv", "population/population.csv", "population/pairs.csv")
 
 
 class WithTables(build_py):

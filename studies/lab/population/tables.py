@@ -6,6 +6,9 @@ from studies.lab.population.rows import Group
 from studies.metrics.distribution import Distribution
 from studies.metrics.judged import DISPLACEMENT, FORCE
 
+FEW = 20
+"""Members below which the 95th percentile would be the worst one: none is shown."""
+
 
 def members_of(groups: Sequence[Group]) -> str:
     """Every body on the members of every organ: the median, what 95 of 100 stay below, and the worst."""
@@ -29,12 +32,12 @@ def members_of(groups: Sequence[Group]) -> str:
 
 
 def _spread(one: Distribution, signed: bool = False) -> list[str]:
-    """Median, bound of 95 of 100 and worst member; dashes where no member compares the quantity."""
+    """Median, bound of 95 of 100 and worst member; dashes where no member compares the quantity, or too few do."""
     if not one.count:
         return ["–", "–", "–"]
     return [
         _with_interval(one.median, one.median_interval, signed),
-        _with_interval(one.bound, one.bound_interval),
+        _with_interval(one.bound, one.bound_interval) if one.count >= FEW else "–",
         f"{one.worst:{'+' if signed else ''}.2g} ({one.worst_member})",
     ]
 

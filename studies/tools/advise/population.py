@@ -8,12 +8,12 @@ import pandas as pd
 
 from massspring import ImplicitVolume
 from studies.base.errors import StudyError
-from studies.metrics.distribution import BOUND, Distribution, distribution_of
+from studies.metrics.distribution import BOUND, Distribution, distribution, distribution_of
 from studies.metrics.judged import DISPLACEMENT, FORCE
 from studies.metrics.wish import Wish, usual_wish
 from studies.runs.case import Case
 from studies.runs.recipe_text import recipe_text
-from studies.runs.recipes import QuadraticBody
+from studies.runs.recipes import BodyRecipe, QuadraticBody
 from studies.scene.kind import has_wall, load_of
 from studies.scene.scene import Scene
 from studies.scene.tissues import TISSUES
@@ -23,12 +23,14 @@ PROBED = {"liver": False, "kidney": False, "stomach": True}
 """Organs of the population that a probe presses -> whether they are hollow."""
 LOADED = {"spleen": "hanging", "bladder": "filled"}
 """Other organs of the population and their load; the rest are under a probe."""
-SIZES, SPEED = (994, 1194, 1594), "real_time [s/s]"
-"""Surface nodes of the adaptive bodies that run in it; column of their simulated over computing time."""
+SIZES, SPEED = (1194, 1594), "real_time [s/s]"
+"""Surface nodes of the two adaptive bodies that ran on most members; column of simulated over computing time."""
 OTHER_MASS = {"heavy": "stiffness", "stiffness": "heavy"}
 """Two masses whose bodies end within a tenth of the targets of each other (docs/accuracy.md)."""
-POPULATION = "population"
-"""Folder and table of the study of random organs, which studies/lab/population draws."""
+NAMES = "force", "displacement"
+POPULATION, PAIRS = "population", "pairs.csv"
+"""Folder and table of the study of random organs, which studies/lab/population draws, and next to it the table of the
+sizes of the errors of the bodies of SIZES, where the reference decides them."""
 
 
 @dataclass(frozen=True)
@@ -95,14 +97,15 @@ def supported(results: Path, scene: Scene, tissue: str) -> tuple[Case, Unseen] |
 
 
 def _unseen(results: Path, case: Case, organ: str) -> Unseen | None:
-    found = _with_recipe(results, recipe_text(case), organ)
+    found = _with_recipe(results, case, organ)
     if found is None and (mass := OTHER_MASS.get(case.body.mass)):
-        found = _with_recipe(results, recipe_text(replace(case, body=replace(case.body, mass=mass))), organ)
+        found = _with_recipe(results, replace(case, body=replace(case.body, mass=mass)), organ)
         found = found and replace(found, mass=mass)
     return found
 
 
-def _with_recipe(results: Path, recipe: str, organ: str) -> Unseen | None:
+def _with_recipe(results: Path, case: Case, organ: str) -> Unseen | None:
+    recipe, body = recipe_text(case), case.body
     roots = (results, results / PUBLISHED, published_for(results))
     tables = [root / POPULATION / f"{POPULATION}.csv" for root in roots]
     path = next((table for table in tables if table.is_file()), None)
@@ -112,12 +115,26 @@ def _with_recipe(results: Path, recipe: str, organ: str) -> Unseen | None:
         rows = pd.read_csv(path)
         rows = rows.loc[(rows["scene"].map(organ_of) == organ) & (rows["recipe"] == recipe)]
         force, displacement = (distribution_of(rows, entry) for entry in (FORCE, DISPLACEMENT))
+        if len(rows) and (pairs := path.with_name(PAIRS)).is_file() and is_of_pairs(body):
+            more = pd.read_csv(pairs)
+            force, displacement = (_sizes(more.loc[more["organ"] == organ], name, body.nodes) for name in NAMES)
         cost = 1.0 / rows[SPEED].median() if SPEED in rows else float("nan")
     except (KeyError, ValueError, OSError) as error:
         raise StudyError(
             f"{path} cannot be read ({error}); remove it, or run studies/lab/population/study.py again"
         ) from error
     return Unseen(organ, force, displacement, str(path), cost) if displacement.count else None
+
+
+def is_of_pairs(body: BodyRecipe) -> bool:
+    """Whether PAIRS has a body."""
+    return isinstance(body, QuadraticBody) and body.graded == "adaptive" and body.nodes in SIZES
+
+
+def _sizes(members: pd.DataFrame, name: str, nodes: int) -> Distribution:
+    """Of the errors that the reference decides."""
+    known = members.set_index("scene")[f"{name}_{nodes}"].dropna()
+    return distribution(known.to_dict(), {})
 
 
 def organ_of(name: str) -> str | None:
@@ -131,12 +148,12 @@ def words(sample: Unseen) -> str:
 
     def bound(name: str, one: Distribution) -> str:
         low, high = one.bound_interval
-        sign = "+" if name == "force" else ""
-        middle = f"the median {name} error is {one.median:{sign}.2g} %"
+        middle = f"the median {name} error is {one.median:.2g} %"
         return f"{middle}, 95 % are below {one.bound:.2g} % ({low:.2g} to {high:.2g})"
 
-    pairs = (("force", sample.force), ("displacement", sample.displacement))
-    errors = [bound(name, one) for name, one in pairs if one.count]
+    errors = [
+        bound(name, one) for name, one in zip(NAMES, (sample.force, sample.displacement), strict=True) if one.count
+    ]
     lost = f", {sample.displacement.lost} more failed" if sample.displacement.lost else ""
     mass = {"": "", "stiffness": ", masses by stiffness", "heavy": ", heavy masses"}[sample.mass]
     kind = f"{sample.organ}, {LOADED.get(sample.organ, 'under a probe')}"

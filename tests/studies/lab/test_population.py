@@ -28,7 +28,7 @@ from studies.lab.population.intervals import (
 from studies.lab.population.ranges import RANGES, SQUEEZE, Filling, Palpation, Sagging
 from studies.lab.population.rows import CODE, groups, merged, rows_of
 from studies.lab.population.study import STUDY, population_study
-from studies.lab.population.tables import members_of
+from studies.lab.population.tables import FEW, members_of
 from studies.metrics.interval import RULE_FILE, bound
 from studies.scene.as_json import scene_from_dict, scene_to_json
 from studies.scene.kind import load_of
@@ -244,11 +244,23 @@ def test_the_lost_are_counted_and_what_is_not_compared_is_a_dash(runs):
         replace(one, case=replace(one.case, scene=replace(one.case.scene, quantities=("surface", "volume"))))
         for one in runs
     ]
-    for some, words in ((runs, "| 2, 1 | +0 (+0 to +0) | 0 "), (still, "| 2, 1 | – | – | – | ")):
+    for some, words in ((runs, "| 2, 1 | +0 (+0 to +0) | – | "), (still, "| 2, 1 | – | – | – | ")):
         every = groups(table_of(some), [one.case for one in some])
         assert words in members_of(every).splitlines()[-1] and "(liver_0_001)" in members_of(every)
         for draw in (figure, front):
             assert len(draw(every).axes) > 0
+
+
+@pytest.mark.usefixtures("_flat_facets")
+def test_a_95th_percentile_needs_twenty_members():
+    many = [made(number, FINE) for number in range(FEW)]
+    for one in many:
+        one.reference.record = one.record
+    for some, words in (
+        (many, "| 20, 0 | +0 (+0 to +0) | 0 (0 to 0) | "),
+        (many[1:], "| 19, 0 | +0 (+0 to +0) | – | "),
+    ):
+        assert words in members_of(groups(table_of(some), [one.case for one in some]))
 
 
 def test_rows_of_two_machines_are_those_of_one(runs, tmp_path):
