@@ -26,7 +26,7 @@ from studies.report.league import league_rows
 pytestmark = pytest.mark.lab
 NODES = 150
 KEPT = 0.2
-"""Worst volume error of our quadratic body while it is pressed [%]: it has 0.145, since multipliers stop at 0.3 % of the
+"""Worst volume error of our quadratic body while it is pressed [%]: it has 0.145, as multipliers stop at 0.3 % of the
 changes of the pressures."""
 TABLE = Path(__file__).parents[3] / "results" / "published" / "league" / "sweep.csv"
 DUMMY = """
