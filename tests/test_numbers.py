@@ -378,9 +378,9 @@ ROWS = [
     opened("rest shape / size", "# %", DISTANCE),
     ("docs/league.md", "needs # to # s for", lambda: span(of(rows("league"), engine="ours-quadratic")["cost [s/s]"])),
     ("docs/league.md", "PyBullet by at most # percentage points and those of Drake by #.", halved_steps),
-    *((SILICONE, f"| {who}{NU.get(who, '')} | #, #, # | #, #, # | #, #, # |",
+    *((SILICONE, f"| {who}{NU.get(who, '')} |{' #, #, # |' * len(loads)}{' – |' * (3 - len(loads))}",
         lambda who=who: of(rows("silicone"), who=who).iloc[:, 2:].to_numpy().ravel().tolist())
-      for who in rows("silicone")["who"].unique()),
+      for who, loads in rows("silicone").groupby("who")),
     *((SILICONE, f"| {name} | # | #, #, # | #, #, # | #, #, # | # | #, #, # |", lambda name=name: [
         of(rows("silicone", "press"), material=name)[column].item() for column in (
             "mu", *tabled("scatter"), *tabled("B"), *tabled("B by mu of A"), "b", *tabled("B with b"))])
