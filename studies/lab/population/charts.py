@@ -13,6 +13,7 @@ from matplotlib.lines import Line2D
 from studies import Metric, Run
 from studies.base.counting import heading
 from studies.lab.population.rows import Group, groups, rows_of
+from studies.lab.population.tables import FEW
 from studies.metrics.cells import DISTURBED_NOTE
 from studies.metrics.distribution import BOUND, ENOUGH, columns_of
 from studies.metrics.table import DISTURBED, PROCESSOR, metric
@@ -137,6 +138,8 @@ def front(groups: Sequence[Group]) -> Figure:
         "time. Computing time is that of the first member of each organ.",
         *timing_notes(all_groups),
     ]
+    if min(len(group.rows) for group in all_groups) < FEW:
+        notes.append(f"Of fewer than {FEW} members the error of 95 of 100 lies between those of the two worst.")
     return finish(sheet, FRONT, list(handles.values()), notes, columns=3)
 
 
