@@ -62,6 +62,20 @@ def test_tables_are_copied_and_rows_drawn_from_them_are_what_a_run_gives(results
     assert draw.main(words) == 1 and "DIFFERS" in capsys.readouterr().out
 
 
+def test_random_organs_are_drawn_that_are_published():
+    *catalogue, people = draw.studies_of(PUBLISHED)
+    rows = pd.read_csv(PUBLISHED / "population" / "population.csv")
+    assert catalogue == list(STUDIES) and len(people.cases) >= len(rows) > 0
+    assert {case.scene.name for case in people.cases} == set(rows["scene"])
+
+
+def test_a_time_is_no_difference_and_a_number_is_one():
+    row = {"status": "ok", "dt/dt_c": 0.5, "cut_ms [ms]": 0.31, "step_time [µs]": 20.0, "force_end [%]": 1.5}
+    later = row | {"cut_ms [ms]": 0.36, "step_time [µs]": 25.0}
+    assert draw.difference(later, row)["verdict"] == "equal"
+    assert draw.difference(later | {"force_end [%]": 1.51}, row)["verdict"] == draw.DIFFERS
+
+
 def test_a_refused_command_of_the_lab_ends_with_its_sentence_and_two(capsys):
     with pytest.raises(SystemExit) as stop, refusal("publish"):
         raise StudyError("nothing makes 'x'")
