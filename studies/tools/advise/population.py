@@ -45,6 +45,8 @@ class Unseen:
     """Median of computing over simulated time [1]."""
     mass: str = ""
     """That of the members where the recipe has the other one of OTHER_MASS."""
+    undecided: int = 0
+    """Members that do not count, because the reference does not decide the error of the displacement."""
 
     def meets(self, wish: Wish) -> bool:
         """Whether 95 of 100 members do."""
@@ -56,7 +58,8 @@ class Unseen:
         """ "95 of 100 random livers: force within 1.7 %, mean displacement within 0.95 %"."""
         errors = f"force within {self.force.bound:.2g} %, mean displacement within {self.displacement.bound:.2g} %"
         count = self.displacement.count
-        return f"{int(BOUND * count)} of {count} random {self.organ}s: {errors}"
+        more = f" ({self.undecided} more undecided)" if self.undecided else ""
+        return f"{int(BOUND * count)} of {count} random {self.organ}s{more}: {errors}"
 
 
 def unseen(results: Path, case: Case) -> Unseen | None:
@@ -115,15 +118,19 @@ def _with_recipe(results: Path, case: Case, organ: str) -> Unseen | None:
         rows = pd.read_csv(path)
         rows = rows.loc[(rows["scene"].map(organ_of) == organ) & (rows["recipe"] == recipe)]
         force, displacement = (distribution_of(rows, entry) for entry in (FORCE, DISPLACEMENT))
+        undecided = 0
         if len(rows) and (pairs := path.with_name(PAIRS)).is_file() and is_of_pairs(body):
             more = pd.read_csv(pairs)
-            force, displacement = (_sizes(more.loc[more["organ"] == organ], name, body.nodes) for name in NAMES)
+            more = more.loc[more["organ"] == organ]
+            if len(more) >= len(rows):
+                force, displacement = (_sizes(more, name, body.nodes) for name in NAMES)
+                undecided = len(more) - displacement.count
         cost = 1.0 / rows[SPEED].median() if SPEED in rows else float("nan")
     except (KeyError, ValueError, OSError) as error:
         raise StudyError(
             f"{path} cannot be read ({error}); remove it, or run studies/lab/population/study.py again"
         ) from error
-    return Unseen(organ, force, displacement, str(path), cost) if displacement.count else None
+    return Unseen(organ, force, displacement, str(path), cost, undecided=undecided) if displacement.count else None
 
 
 def is_of_pairs(body: BodyRecipe) -> bool:
@@ -155,6 +162,7 @@ def words(sample: Unseen) -> str:
         bound(name, one) for name, one in zip(NAMES, (sample.force, sample.displacement), strict=True) if one.count
     ]
     lost = f", {sample.displacement.lost} more failed" if sample.displacement.lost else ""
+    lost += f", {sample.undecided} more that the reference does not decide" if sample.undecided else ""
     mass = {"": "", "stiffness": ", masses by stiffness", "heavy": ", heavy masses"}[sample.mass]
     kind = f"{sample.organ}, {LOADED.get(sample.organ, 'under a probe')}"
     return f"on {sample.displacement.count} other organs ({kind}{mass}{lost}) {', '.join(errors)}"

@@ -104,7 +104,8 @@ def broken(setup: Setup, history: History) -> str:
         least, most = depths(gap, body.surface_nodes, body.contact_facets)
         # Between nodes a round obstacle may be deeper.
         if record < least - allowed or (isinstance(obstacle, Plane) and record > most + allowed):
-            return f"a node is {least:.3g} m inside obstacle {number}, the record says {record:.3g} m"
+            depth = f"{least:.3g} to {most:.3g} m inside obstacle {number}"
+            return f"the surface is {depth}, the record says {record:.3g} m"
     return ""
 
 

@@ -89,10 +89,14 @@ def test_the_two_bodies_that_ran_on_more_members_are_told_by_those(tmp_path):
     pairs.to_csv(tmp_path / "population" / "pairs.csv", index=False)
     sample = unseen(tmp_path, fine)
     counted = sample.force.count, sample.displacement.count, sample.displacement.lost
+    assert "59 other organs (liver, under a probe, 1 more that the reference does not decide)" in words(sample)
+    assert sample.promise.startswith("56 of 59 random livers (1 more undecided): ")
     assert counted == (60, 59, 0) and (sample.force.bound, sample.displacement.bound) == pytest.approx((0.1, 0.3))
     table(tmp_path / "other" / "population" / "population.csv")
     pairs.to_csv(tmp_path / "other" / "population" / "pairs.csv", index=False)
     assert unseen(tmp_path / "other", CASE).force.count == 41
+    pairs.assign(organ="kidney").to_csv(tmp_path / "population" / "pairs.csv", index=False)
+    assert unseen(tmp_path, fine).force.count == 41, "an organ that the pairs lack has its table"
 
 
 def test_a_table_that_lacks_a_column_is_named(tmp_path):
