@@ -85,14 +85,20 @@ class Reference(Solution):
 def load_reference(root: Path, scene: Scene) -> Reference | None:
     """The stored reference of a scene; None for a scene without a plan.
 
-    Raises StudyError when it is missing, or did not converge.
+    Raises StudyError when it is missing or did not converge, or only its coarsest mesh did: with what would it agree?
     """
     if scene.reference is None:
         return None
     record = read_record(ReferenceSolve(scene).path(root))
     if record.status != Status.OK:
         raise StudyError(f"the reference of '{scene.name}' is {record.status}: {record.message}")
-    return Reference(scene, record)
+    reference = Reference(scene, record)
+    if len(reference.meshes) < 2:
+        raise StudyError(
+            f"the reference of '{scene.name}' has no uncertainty, so it judges nothing: only its coarsest mesh was "
+            f"solved; {record.attributes['stopped']}"
+        )
+    return reference
 
 
 def reference_for(root: Path, scene: Scene) -> Reference | None:

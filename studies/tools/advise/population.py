@@ -1,6 +1,8 @@
 """What a recipe did on organs it was never chosen on: the bound that 95 of 100 members of a population kept."""
 
 import re
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -8,6 +10,7 @@ import pandas as pd
 
 from massspring import ImplicitVolume
 from studies.base.errors import StudyError
+from studies.catalog.accuracy import usual_mass
 from studies.metrics.distribution import BOUND, Distribution, distribution, distribution_of
 from studies.metrics.judged import DISPLACEMENT, FORCE
 from studies.metrics.wish import Wish, usual_wish
@@ -89,7 +92,7 @@ def supported(results: Path, scene: Scene, tissue: str) -> tuple[Case, Unseen] |
     """
     organ, best = drawn_for(scene, tissue), None
     for nodes in SIZES:
-        body = QuadraticBody(nodes, graded="adaptive", mass="stiffness")
+        body = QuadraticBody(nodes, graded="adaptive", mass=usual_mass(scene))
         case = Case(scene, body, ImplicitVolume(), dt_fraction=0.8)
         sample = _unseen(results, case, organ)
         if sample is not None:
@@ -114,23 +117,31 @@ def _with_recipe(results: Path, case: Case, organ: str) -> Unseen | None:
     path = next((table for table in tables if table.is_file()), None)
     if path is None:
         return None
-    try:
+    with _reading(path):
         rows = pd.read_csv(path)
         rows = rows.loc[(rows["scene"].map(organ_of) == organ) & (rows["recipe"] == recipe)]
         force, displacement = (distribution_of(rows, entry) for entry in (FORCE, DISPLACEMENT))
-        undecided = 0
-        if len(rows) and (pairs := path.with_name(PAIRS)).is_file() and is_of_pairs(body):
+        cost = 1.0 / rows[SPEED].median() if SPEED in rows else float("nan")
+    undecided = 0
+    if len(rows) and (pairs := path.with_name(PAIRS)).is_file() and is_of_pairs(body):
+        with _reading(pairs):
             more = pd.read_csv(pairs)
             more = more.loc[more["organ"] == organ]
             if len(more) >= len(rows):
                 force, displacement = (_sizes(more, name, body.nodes) for name in NAMES)
                 undecided = len(more) - displacement.count
-        cost = 1.0 / rows[SPEED].median() if SPEED in rows else float("nan")
+    return Unseen(organ, force, displacement, str(path), cost, undecided=undecided) if displacement.count else None
+
+
+@contextmanager
+def _reading(path: Path) -> Iterator[None]:
+    """Turns what is wrong with the table at `path` into a StudyError."""
+    try:
+        yield
     except (KeyError, ValueError, OSError) as error:
         raise StudyError(
             f"{path} cannot be read ({error}); remove it, or run studies/lab/population/study.py again"
         ) from error
-    return Unseen(organ, force, displacement, str(path), cost, undecided=undecided) if displacement.count else None
 
 
 def is_of_pairs(body: BodyRecipe) -> bool:

@@ -9,6 +9,7 @@ import pytest
 
 from massspring import ImplicitVolume
 from studies.base.errors import StudyError
+from studies.catalog.accuracy import usual_mass
 from studies.metrics.wish import usual_wish
 from studies.runs.case import Case
 from studies.runs.recipe_text import recipe_text
@@ -75,7 +76,7 @@ def test_the_smallest_body_that_keeps_the_targets_on_95_of_100_organs_is_support
     for tissue, scene in {"liver": LIVER_PROBE, "kidney": LIVER_PROBE, "bladder": STOMACH_PROBE}.items():
         case, sample = supported(shipped(), scene, tissue)
         found[tissue] = case.body.nodes, sample.organ
-        assert sample.meets(usual_wish(scene)) and case.scene == scene
+        assert sample.meets(usual_wish(scene)) and case.scene == scene and case.body.mass == usual_mass(scene)
     assert found == {"liver": (1594, "liver"), "kidney": (1194, "kidney"), "bladder": (1194, "stomach")}
     assert re.fullmatch(r"47 of 50 random stomachs: force within .* %, mean displacement within .* %", sample.promise)
 
@@ -105,6 +106,11 @@ def test_a_table_that_lacks_a_column_is_named(tmp_path):
     pd.read_csv(path).drop(columns="recipe").to_csv(path, index=False)
     with pytest.raises(StudyError, match=r"population\.csv cannot be read"):
         unseen(tmp_path, CASE)
+    fine = replace(CASE, body=QuadraticBody(1594, graded="adaptive"))
+    table(path, fine)
+    path.with_name("pairs.csv").write_text("scene\n")
+    with pytest.raises(StudyError, match=r"pairs\.csv cannot be read"):
+        unseen(tmp_path, fine)
 
 
 def test_names_of_members_and_of_nothing_else_tell_their_organ():
