@@ -24,9 +24,10 @@ from studies.exchange.meshes import NODES, given_meshes, given_scene
 from studies.metrics.run import Run
 from studies.reference.load import reference_for
 from studies.runs.case import Case
-from studies.runs.indicators import sway
+from studies.runs.crossing import crossed
+from studies.runs.indicators import CROSSED, sway, through_itself
 from studies.runs.prepare import LUMEN
-from studies.runs.status import folding, tunnelling
+from studies.runs.status import crossing, folding, tunnelling
 from studies.scene.scene import Scene
 from studies.store.record import Record, Status, new_fields, new_record, write_record
 from studies.store.schema import RUN_FIELDS
@@ -93,7 +94,12 @@ def entry_record(
     about = {ENTRY: f"{path.name} sha256:{digest}", SECONDS: seconds}
     if "force" in fitting.histories:  # how much it varies at the end
         about["sway"] = sway(scene, values["t"], values["contact_force"], values["held_force"])
+    whole = scene.cut is None  # faces of a cut touch
+    itself = crossed(values["triangles"], values["rest"], values["snapshots"]) if whole else float("nan")
+    about |= {"crossed": itself} | ({"warnings": through_itself(itself)} if 0.0 < itself <= CROSSED else {})
     status, message = folding(values["min_j"], shaped=scene.start is not None and scene.start.shaped)
+    if status == Status.OK:
+        status, message = crossing(itself)
     slipped = tunnelling(values["inside"])
     status, message = (Status.TUNNELLED, slipped) if slipped else (status, message)
     return _record(Case(scene, fitting.mesh.recipe, method), status, message, _attributes(fitting) | about, values)

@@ -15,6 +15,7 @@ from studies.base.compile_watch import watching
 from studies.base.errors import DoesNotApply, StudyError
 from studies.geometry.mesh.organ_mesh import tetrahedron_volumes
 from studies.runs.case import Case, case_from_json
+from studies.runs.crossing import crossed
 from studies.runs.current import case_fingerprint, case_path
 from studies.runs.cutting import LUMEN
 from studies.runs.indicators import indicators, remarks
@@ -74,14 +75,15 @@ def record_of(
             if own is None:
                 raise
             return _record(case, Status.FAILED, own, {"warnings": _warning_text(caught)}, {})
-    status, message = status_of(case, history)
+    itself = crossed_at_checkpoints(case, prepared, history)
+    status, message = status_of(case, history, itself)
     keeps = case.method.volume_tol is not None
     clock = prepared.setup.clock
     damping = prepared.setup.damping_in(clock.frames - 1)
     signs = indicators(case.scene, prepared.body, history, _lumen_column(prepared), keeps, clock.steps, damping)
     end, held = history.final, prepared.setup.attachments
     places = [] if prepared.opening else regions(case.scene, prepared.body, held, end, float(history.t[-1]))
-    signs["missed_at_outlines"] = missed_at_outlines(prepared.body, places, end)
+    signs |= {"missed_at_outlines": missed_at_outlines(prepared.body, places, end), "crossed": itself}
     text = "; ".join(filter(None, [_warning_text(caught), *remarks(case.scene, signs)]))
     attributes = {**_attributes(prepared, history), **signs, "warnings": text}
     return _record(case, status, message, attributes, _fields(case, prepared, history))
@@ -102,6 +104,14 @@ def snapshot_frames(case: Case, prepared: Prepared) -> list[int]:
     recorded."""
     at = checkpoint_frames(case, prepared)
     return moments(prepared.setup.clock.frames, at) if "surface" in case.recorded else at
+
+
+def crossed_at_checkpoints(case: Case, prepared: Prepared, history: History) -> float:
+    """See `crossed`; NaN of a body that is cut, whose faces touch, and of a run that ended early."""
+    if prepared.opening is not None or history.outcome != "finished":
+        return float("nan")
+    at = np.isin(history.snapshot_frames, checkpoint_frames(case, prepared))
+    return crossed(prepared.body.triangles, prepared.body.rest, history.snapshots[at])
 
 
 def _record(case: Case, status: Status, message: str, attributes: dict, fields: dict[str, Field]) -> Record:

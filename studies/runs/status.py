@@ -4,7 +4,7 @@ import numpy as np
 
 from massspring import History
 from studies.runs.case import Case
-from studies.runs.indicators import FEEDS, LESS, SHAKES, SWINGS, gained, swing
+from studies.runs.indicators import CROSSED, FEEDS, LESS, SHAKES, SWINGS, gained, swing, through_itself
 from studies.scene.scene import Scene
 from studies.store.schema import Status
 
@@ -18,8 +18,8 @@ it is below 0.1, at the latest a frame (0.1 % compression) later, and least J re
 the edge of a held region, where the strain has no bound: 0.13 in the catalogue (ball_clamped)."""
 
 
-def status_of(case: Case, history: History) -> tuple[Status, str]:
-    """The status of a run, and a sentence on the reason; empty where it is ok."""
+def status_of(case: Case, history: History, itself: float = float("nan")) -> tuple[Status, str]:
+    """The status of a run, and a sentence on the reason; empty where it is ok. itself: see `crossed`."""
     if history.outcome != "finished":
         return Status(history.outcome), history.message
     start = case.scene.start
@@ -37,7 +37,12 @@ def status_of(case: Case, history: History) -> tuple[Status, str]:
     drift = float(np.max(np.abs(history.volume[since:] / history.volume_target[since:] - 1)))
     if case.method.volume_tol is not None and drift > DRIFT:
         return Status.DRIFTED, f"volume error {100 * drift:.3g} % (allowed: {100 * DRIFT:g} %)"
-    return Status.OK, ""
+    return crossing(itself)
+
+
+def crossing(itself: float) -> tuple[Status, str]:
+    """Whether the body passed through itself, which where elements invert is a sequel; and a sentence on it."""
+    return (Status.TUNNELLED, through_itself(itself)) if itself > CROSSED else (Status.OK, "")
 
 
 def shaking(scene: Scene, history: History) -> tuple[Status, str]:

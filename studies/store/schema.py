@@ -32,7 +32,7 @@ class Status(StrEnum):
     FOLDED = "folded"  # J of an element is below 0.1 after a frame
     INVERTED = "inverted"  # J of an element is 0 or less after a frame
     SHAKEN = "shaken"  # the body gains energy that nothing gives it
-    TUNNELLED = "tunnelled"  # the middle of a sphere or capsule was inside the body
+    TUNNELLED = "tunnelled"  # the middle of a sphere or capsule, or part of the surface, was inside the body
     DRIFTED = "drifted"  # a kept volume more than 1 % off
     NOT_CONVERGED = "not-converged"  # the reference found no equilibrium at a checkpoint
     BLOCKED = "blocked"  # a thin probe was driven through tissue that had nowhere to go
@@ -150,6 +150,7 @@ class RunAttributes(Timed):
     damping_at_rest = optional_value(float, "1/s", "the same where nothing moves")
     unbalanced = optional_value(float, "1", "force at a checkpoint that moves the body, over the largest force")
     unsettled = optional_value(float, "1", "way of the body to rest at the end, over its displacement")
+    crossed = optional_value(float, "1", "share of the surface inside the body itself, the most at a checkpoint")
     missed_at_outlines = optional_value(float, "1", "error by coarse elements where held tissue or contact ends")
     warnings = value(str, "", "what preparing the case warned of, and what its indicators report")
     entry = optional_value(str, "", "of an entry from outside: its file, with the SHA-256 of its positions")

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from massspring import Sphere
+from studies.exchange import judge as module
 from studies.exchange.description import OURS, judged_metrics
 from studies.exchange.entry import entries_beside, entry_files, run_of_entry
 from studies.exchange.judge import entry_record
@@ -99,6 +100,14 @@ def test_an_entry_with_a_sphere_inside_says_so(ours, tmp_path, height, status):
     assert record.status == status
     depth = record.fields["penetration"].values[0, 0]
     assert depth == pytest.approx(0.02 + 0.05 if height == 0.0 else 0.0, abs=3e-3)
+
+
+@pytest.mark.parametrize(("share", "status"), [(0.003, Status.OK), (0.02, Status.TUNNELLED)])
+def test_an_entry_that_passes_through_itself_says_so(ours, tmp_path, monkeypatch, share, status):
+    monkeypatch.setattr(module, "crossed", lambda *where: share)
+    record = entry_record(SCENE, ours.npz(tmp_path / "a.npz"), "theirs", NODES)
+    said = record.message or record.attributes["warnings"]
+    assert record.status == status and f"up to {100 * share:g} % of the surface lies inside the body" in said
 
 
 @pytest.mark.parametrize(("height", "status"), [(0.05, Status.FOLDED), (-1.0, Status.INVERTED)])

@@ -111,6 +111,7 @@ def test_before_the_cut_copies_lie_on_each_other_and_after_it_they_part(incised)
     scene, rest = run.case.scene, run.fields.rest
     assert int(run.record.attributes["cut_frame"]) == round(scene.cut.at * scene.frames / scene.duration)
     np.testing.assert_array_equal(*rest[run.cut_pairs.T])
+    assert np.isnan(run.record.attributes["crossed"]), "faces of a cut touch"
     assert np.abs(scene.cut.plane.level(rest[run.cut_pairs[:, 0]])).max() < 1e-4  # m: curved sides
     assert run.opening[:, 2].min() > 1e-3
     area = triangle_areas(rest, run.record.fields["cut_faces"].values).sum()

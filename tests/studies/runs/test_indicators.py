@@ -64,6 +64,7 @@ GOOD = {
     "unsettled": 1e-3,
     "shortened": 1.5,
     "missed_at_outlines": 0.02,
+    "crossed": 0.0,
 }
 
 
@@ -198,6 +199,7 @@ def test_a_checkerboard_counts_and_a_gradient_does_not():
         ({"pace": 0.9}, "10 % too slow"),
         ({"shortened": 2.5}, "2.5 times shorter"),
         ({"volume_off": 2.5e-3}, "0.25 % off (bound 0.01 %)"),
+        ({"crossed": 0.003}, "up to 0.3 % of the surface lies inside the body"),
     ],
 )
 def test_each_indicator_has_a_remark_beyond_its_bound(changed, word):

@@ -11,6 +11,7 @@ from studies.base.errors import StudyError
 from studies.geometry import HalfSpace
 from studies.runs import run as module
 from studies.runs.case import Case
+from studies.runs.indicators import CROSSED
 from studies.runs.prepare import prepare
 from studies.runs.recipes import BODIES, MembraneBody, SurfaceBody, TetrahedralBody
 from studies.runs.run import checkpoint_frames, measure, record_of, replay, run_case
@@ -310,6 +311,28 @@ def test_an_obstacle_that_was_inside_in_any_frame_tunnelled(ended, frame):
     verdict, message = status_of(case, replace(history, inside=inside, min_j=-np.ones(FRAMES)))
     assert verdict == Status.TUNNELLED and f"obstacle 1 is or was inside the body in 1 of {FRAMES} frames" in message
     assert status_of(case, replace(history, inside=inside & False))[0] == Status.OK
+
+
+def test_a_body_that_passed_through_itself_tunnelled(ended):
+    case, _, history = ended
+    assert status_of(case, history, CROSSED) == (Status.OK, "")
+    verdict, message = status_of(case, history, 1.01 * CROSSED)
+    assert verdict == Status.TUNNELLED and "up to 1 % of the surface lies inside the body" in message
+
+
+@pytest.mark.parametrize(("share", "status"), [(0.0, Status.OK), (0.003, Status.OK), (0.02, Status.TUNNELLED)])
+def test_what_lies_inside_the_body_itself_is_looked_for_at_checkpoints(monkeypatch, mesh_cache, share, status):
+    """And said where it is little."""
+    asked = []
+    monkeypatch.setattr(module, "crossed", lambda *where: asked.append(where) or share)
+    case = tiny_case()
+    record = record_of(case)
+    ((triangles, rest, positions),) = asked
+    for name, value in {"triangles": triangles, "rest": rest, "snapshots": positions}.items():
+        np.testing.assert_array_equal(record.fields[name].values, value)
+    assert len(positions) == len(case.scene.checkpoints)
+    assert (record.status, record.attributes["crossed"]) == (status, share)
+    assert ("of the surface lies inside the body" in record.attributes["warnings"]) == (share == 0.003)
 
 
 def test_measure_checks_the_scene_as_the_command_does(mesh_cache):
