@@ -31,9 +31,14 @@ def check_clock(scene: Scene, file: str = "") -> None:
         raise StudyError(f"{file}scene '{scene.name}': checkpoints is {times!r}; give a tuple of times [s]")
     if not all(is_number(t) for t in times) or any(b <= a for a, b in zip((0.0, *times), times, strict=False)):
         raise StudyError(f"{file}scene '{scene.name}': the checkpoints are {times} s; give ascending times above 0")
-    if (scene.reference is not None and not times) or (times and times[-1] > scene.duration * (1 + 1e-9)):
+    if scene.reference is not None and not times:
         raise StudyError(
-            f"{file}scene '{scene.name}': its checkpoints end at {times[-1] if times else None} s and the scene at "
+            f"{file}scene '{scene.name}' has a reference and no checkpoints; give the times [s] at which runs are "
+            "compared with it"
+        )
+    if times and times[-1] > scene.duration * (1 + 1e-9):
+        raise StudyError(
+            f"{file}scene '{scene.name}': its checkpoints end at {times[-1]} s and the scene at "
             f"{scene.duration:g} s; a run is compared with its reference at times within the scene"
         )
 

@@ -65,7 +65,7 @@ def check_content(content: Content, name: str) -> Content:
     coordinates; name: of the file."""
     points = content.points
     if not points.size:
-        raise StudyError(f"{name}: the file has no points; export a surface or a volume mesh")
+        raise StudyError(f"{name}: the file has no points, or no cell uses them; export a surface or a volume mesh")
     if points.ndim != 2 or points.shape[1] != 3:
         raise StudyError(f"{name}: points have shape {points.shape}; a body needs three coordinates per point")
     if not len(content.cells):

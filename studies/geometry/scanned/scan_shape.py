@@ -31,6 +31,8 @@ ROOM = 4
 """Cells between the surface and the walls of the grid, so that the steps of the mesher stay inside."""
 NEAR = 0.002
 """Largest distance over the diagonal between surface and shape: a tenth of NOTABLE."""
+WIDEST = 0.5
+"""Largest opening that is closed, over the size: the grid grows with its cube."""
 TIGHT = 1.0
 """Smallest thickening of a wall in cells, which makes it tight on the grid."""
 BLUNT = 0.7
@@ -118,7 +120,13 @@ def solidified(points: np.ndarray, triangles: np.ndarray, opening: float, name: 
     reachable from outside is the outside, and grows back by the same amount. Raises StudyError if nothing is enclosed.
     """
     used = points[np.unique(triangles)]
-    cell = FINEST * float(np.linalg.norm(np.ptp(used, axis=0)))
+    size = float(np.linalg.norm(np.ptp(used, axis=0)))
+    if opening > WIDEST * size:
+        raise StudyError(
+            f"{name}: openings of {1e3 * opening:.3g} mm are wider than half of the body's size, {1e3 * size:.3g} mm; "
+            "give a smaller --solid"
+        )
+    cell = FINEST * size
     reach = max(0.5 * opening, TIGHT * cell)
     margin = reach + ROOM * cell
     low = used.min(axis=0) - margin

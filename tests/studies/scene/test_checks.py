@@ -55,6 +55,7 @@ BROKEN = {
     "its organ 'ball' is solid; leave it out": {"lumen": Lumen()},
     "a scene is called 5; give a text": {"name": 5},
     "checkpoints is None; give a tuple of times": {"checkpoints": None},
+    "has a reference and no checkpoints; give the times": {"reference": PLAN, "checkpoints": ()},
     "checkpoints end at 99.0 s": {"checkpoints": (1.0, 99.0)},
     "shear modulus is 0.0018 Pa, the usual range is 100 to": {"tissue": replace(SOFT, shear_modulus=0.0018)},
     "kappa/mu = 9.67, a Poisson ratio of 0.45,": {"tissue": replace(SOFT, bulk_over_shear=29 / 3)},

@@ -103,3 +103,5 @@ def test_what_would_leave_nothing_is_refused():
     bowl = BALL[1][EGG[BALL[1]].mean(axis=1)[:, 2] < -5 * MM]
     with pytest.raises(StudyError, match=r"bowl: the surface encloses nothing when openings up to 3 mm are closed"):
         solidified(EGG, bowl, 3 * MM, "bowl")
+    with pytest.raises(StudyError, match=r"bowl: openings of 60 mm are wider than half of the body's size, .* mm;"):
+        solidified(EGG, bowl, 60 * MM, "bowl")
