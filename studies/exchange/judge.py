@@ -94,8 +94,7 @@ def entry_record(
     about = {ENTRY: f"{path.name} sha256:{digest}", SECONDS: seconds}
     if "force" in fitting.histories:  # how much it varies at the end
         about["sway"] = sway(scene, values["t"], values["contact_force"], values["held_force"])
-    whole = scene.cut is None  # faces of a cut touch
-    itself = crossed(values["triangles"], values["rest"], values["snapshots"]) if whole else float("nan")
+    itself = crossed(values["triangles"], values["rest"], values["snapshots"])
     about |= {"crossed": itself} | ({"warnings": through_itself(itself)} if 0.0 < itself <= CROSSED else {})
     status, message = folding(values["min_j"], shaped=scene.start is not None and scene.start.shaped)
     if status == Status.OK:

@@ -75,7 +75,10 @@ def record_of(
             if own is None:
                 raise
             return _record(case, Status.FAILED, own, {"warnings": _warning_text(caught)}, {})
-    itself = crossed_at_checkpoints(case, prepared, history)
+    fields = _fields(case, prepared, history)
+    itself = float("nan")
+    if history.outcome == "finished":
+        itself = crossed(*(fields[name].values for name in ("triangles", "rest", "snapshots")))
     status, message = status_of(case, history, itself)
     keeps = case.method.volume_tol is not None
     clock = prepared.setup.clock
@@ -86,7 +89,7 @@ def record_of(
     signs |= {"missed_at_outlines": missed_at_outlines(prepared.body, places, end), "crossed": itself}
     text = "; ".join(filter(None, [_warning_text(caught), *remarks(case.scene, signs)]))
     attributes = {**_attributes(prepared, history), **signs, "warnings": text}
-    return _record(case, status, message, attributes, _fields(case, prepared, history))
+    return _record(case, status, message, attributes, fields)
 
 
 def _warning_text(caught: list[warnings.WarningMessage]) -> str:
@@ -104,14 +107,6 @@ def snapshot_frames(case: Case, prepared: Prepared) -> list[int]:
     recorded."""
     at = checkpoint_frames(case, prepared)
     return moments(prepared.setup.clock.frames, at) if "surface" in case.recorded else at
-
-
-def crossed_at_checkpoints(case: Case, prepared: Prepared, history: History) -> float:
-    """See `crossed`; NaN of a body that is cut, whose faces touch, and of a run that ended early."""
-    if prepared.opening is not None or history.outcome != "finished":
-        return float("nan")
-    at = np.isin(history.snapshot_frames, checkpoint_frames(case, prepared))
-    return crossed(prepared.body.triangles, prepared.body.rest, history.snapshots[at])
 
 
 def _record(case: Case, status: Status, message: str, attributes: dict, fields: dict[str, Field]) -> Record:
