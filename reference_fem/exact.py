@@ -1,4 +1,4 @@
-"""Closed forms and converged tables with which the solver is compared (docs/theory.md, oracles). SI units
+"""Closed forms and converged tables with which the solver is compared (docs/theory.md, section 6). SI units
 throughout."""
 
 from collections.abc import Callable, Sequence

@@ -1,4 +1,4 @@
-"""The largest frequency of a spring network and the time step it allows (docs/theory.md, section 3)."""
+"""The largest frequency of a spring network and the time step it allows (docs/theory.md, section 5)."""
 
 import math
 from dataclasses import dataclass

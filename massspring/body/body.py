@@ -59,7 +59,7 @@ class Measured(NamedTuple):
     volume: np.ndarray
     """V_r [m³], (m,)."""
     least_j: float
-    """Smallest J [1]: of quadratic elements det F at their points (eq. 8.9), as in a reference, of linear ones
+    """Smallest J [1]: of quadratic elements det F at their points (eq. 8.8), as in a reference, of linear ones
     V_t / V_t0 (eq. 2.3); NaN without elements, or where one is not a number."""
     local_energy: float
     """½ b Σ_q w_q (J_q − 1)² [J]; 0 for a body without `local_bulk`."""

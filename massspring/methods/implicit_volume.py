@@ -179,7 +179,8 @@ class ImplicitVolume(Method):
 
     tolerance: float = 1e-5
     """Volume error that an iterative solve may leave, over the volume [1]: a thirtieth of what a kept volume may have,
-    and the next step corrects it. Quadratic bodies also stop by the changes of their pressures (eq. 8.13)."""
+    and the next step corrects it. Quadratic bodies also stop by the changes of their pressures (docs/theory.md,
+    section 8)."""
     most_iterations: int = 200
     recovers: bool = False
     """Whether a body with several volumes recovers from a start that is inverted, flat or arbitrary: meanwhile it has

@@ -57,7 +57,7 @@ class PostStabilization(Method):
     """Keeps the volume's rate by a pressure, and the volume itself by moving nodes afterwards.
 
     Cline and Pai, IEEE International Conference on Robotics and Automation (2003). First dV/dt = 0 at the end of the
-    step, then x += W̃ G (V0 − V)/(G·W̃·G) at the new positions, velocities untouched (docs/theory.md, eq. 10.3, 10.7).
+    step, then x += W̃ G (V0 − V)/(G·W̃·G) at the new positions, velocities untouched (docs/theory.md, eq. 10.5, 10.7).
 
     Limits: the correction ignores the dynamics. It moves nodes without a change of velocity, which excites the springs
     slightly and does not conserve angular momentum exactly. Only the positions follow a moving target.

@@ -90,7 +90,7 @@ def carried_contact(coarse: System, pressure: np.ndarray, fine: System) -> np.nd
 
 def multipliers(system: System, x: np.ndarray, t: float, pressure: np.ndarray) -> np.ndarray:
     """Multipliers m (no, nf, nq) [Pa] with which the points of a body at x have the contact pressure t = max(0, m -
-    eps g) that is given (docs/theory.md, eq. 6.5).
+    eps g) that is given (docs/theory.md, eq. 6.2).
 
     The finer surface differs slightly in position from the coarser one, and eps times this difference is up to 25 times
     the pressure. With the pressures themselves as multipliers, the first tangent is not positive definite on

@@ -8,7 +8,7 @@ from studies.scene.library.stress import STRESS_SCENES
 from studies.store.schema import Status
 
 NODES = 230
-"""On the surface: about 316 with those inside, as many as in docs/theory.md, section 5."""
+"""On the surface: about 316 with those inside."""
 ONE, MANY = TetrahedralBody(nodes=NODES), TetrahedralBody(nodes=NODES, volumes="nodal")
 TAUT = TetrahedralBody(nodes=NODES, law="cotangent", volumes="nodal")
 FRACTION = 0.2

@@ -261,7 +261,7 @@ def push_along(elements, axis, lane):
 
 @njit_lean
 def push_into(rows, p):
-    """Jᵀ p [N] into `quick.force` (n, 4), with pressures `p` (m,) [Pa] (eq. 8.12)."""
+    """Jᵀ p [N] into `quick.force` (n, 4), with pressures `p` (m,) [Pa] (eq. 8.11)."""
     elements = rows.quick
     elements.force[:] = 0.0
     name_pressures(elements, p, elements.corner_pressure)

@@ -6,7 +6,7 @@ from massspring.kernels.jit.vec3 import cross, dot, plus, row, times
 
 @njit_exposed
 def jacobians_into(x, cells, slopes, weight, out):
-    """J_q = (W_1 × W_2)·W_3/(24 w_q) [1] into `out` (k, p), W_i = ∂x/∂b_i at the point (eq. 8.9).
+    """J_q = (W_1 × W_2)·W_3/(24 w_q) [1] into `out` (k, p), W_i = ∂x/∂b_i at the point (eq. 8.10a).
 
     x: (n, 3) [m]; slopes: ∂N_a/∂b_i, (p, 10, 3); weight: w_q [m³], (k, p).
     """

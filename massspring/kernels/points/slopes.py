@@ -52,7 +52,7 @@ def load_three(table, row, lane):
 @njit_inlined
 def open_block(rows, lane):
     """B_i = (4 o − 1)(x_i − x_0) + 4 o Σ_j (x_ij − x_0j), from the tile's vector x at corners and mid-sides: the part
-    of ∂x/∂b_i − ∂x/∂b_0 common to all points (eq. 8.9)."""
+    of ∂x/∂b_i − ∂x/∂b_0 common to all points (eq. 8.10a)."""
     corner, side = spread(4.0 * rows.other - 1.0, rows.tile), spread(4.0 * rows.other, rows.tile)
     x, tile = rows.tile, flat(rows.tile, 0, rows.tile.shape[0])
     for axis in range(3):

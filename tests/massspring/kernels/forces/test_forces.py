@@ -1,4 +1,4 @@
-"""Every derivative against finite differences, every identity of docs/theory.md section 1; cubics along a line."""
+"""Every derivative against finite differences, every identity of docs/theory.md, section 2; cubics along a line."""
 
 import numpy as np
 import pytest
