@@ -37,6 +37,7 @@ LARGE = 10.0
 """Factor on the size of the body beyond which a length is an error."""
 COMPARED = ("force", "surface", "interior", "silhouette", "volume", "frequency")
 """What the quantities of a scene may name."""
+WEIGHTLESS = "gravity acts on the wall alone: the content of the lumen has no weight; drain it with Lumen('open')"
 AXIS_POINTS = 9
 SIDES = ((0, 1), (1, 2), (2, 0), (0, 1, 2))
 """Corners of a triangle whose mean is one more sample of the surface: its edges and its middle."""
@@ -57,6 +58,8 @@ def check_scene(scene: Scene) -> list[str]:
     ]
     _check_organ(scene)
     _check_lumen(scene)
+    if scene.filled and any(scene.gravity):
+        remarks.append(WEIGHTLESS)
     for cut in scene.cuts:
         check_cuttable(scene, cut)
     if not scene.obstacles and not scene.held and not scene.cuts:

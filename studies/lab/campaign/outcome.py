@@ -31,7 +31,7 @@ from studies.metrics.judged import DISPLACEMENT, FORCE
 from studies.metrics.wish import usual_wish
 from studies.runs.current import case_path
 from studies.runs.indicators import remarks
-from studies.scene.checks import check_scene
+from studies.scene.checks import WEIGHTLESS
 from studies.store.record import write_record
 
 JUDGED, UNIFORM, ADVISED = "run FILE.py", "uniform", "advised"
@@ -40,7 +40,8 @@ random size; the one that `advise` recommends."""
 FAR = 3.0
 """Error over the target beyond which a body is far off."""
 ELSEWHERE = "frames take longer", "the motion is", "on the way"
-"""Parts of sentences on cost and on the way: they do not doubt the end, where a member is judged."""
+"""Parts of sentences on cost and on the way: they do not doubt the end, where a member is judged. Nor does WEIGHTLESS,
+on what the reference lacks, too."""
 NO_HEAVIER = re.compile(r"mass='heavy' makes the body no heavier than its tissue: [^;]*")
 """A warning on cost, too."""
 
@@ -123,7 +124,7 @@ def _ended(
 ) -> tuple[Outcome, Run | None]:
     """What is told of a case, and its run if it is ok; ran: records of the scene by recipe, which do not run again."""
     try:
-        odd, case = check_scene(scene), chosen()
+        case = chosen()
         recipe = f"{case.body!r}, dt_fraction={case.dt_fraction:g}"
         record = ran.get(recipe) or measure(case)
     except StudyError as error:
@@ -139,10 +140,10 @@ def _ended(
         return one, None
     run = Run(case, record)
     one.signs = {name: value for name, value in record.attributes.items() if isinstance(value, int | float)}
-    warnings = NO_HEAVIER.sub("", str(record.attributes["warnings"]))
+    warnings = NO_HEAVIER.sub("", str(record.attributes["warnings"])).replace(WEIGHTLESS, "")
     for sentence in remarks(scene, one.signs):
         warnings = warnings.replace(sentence, "") if any(part in sentence for part in ELSEWHERE) else warnings
-    one.doubts = [words for words in (*odd, warnings.strip("; "), "few facets" * few_facets(run)) if words]
+    one.doubts = [words for words in (warnings.strip("; "), "few facets" * few_facets(run)) if words]
     one.signs |= {entry.name: value for entry in METRICS if math.isfinite(value := entry(run))}
     return one, run
 

@@ -9,9 +9,9 @@ from massspring import Capsule, Plane, Probe, Sphere, Trajectory
 from studies.base.errors import StudyError
 from studies.geometry import BallRegion, HalfSpace
 from studies.geometry.organs import make_shape
-from studies.scene.checks import check_scene, depth_at_start, surface_of
+from studies.scene.checks import WEIGHTLESS, check_scene, depth_at_start, surface_of
 from studies.scene.cut import Cut
-from studies.scene.library import SCENES
+from studies.scene.library import SCENES, STOMACH_PRESS
 from studies.scene.library.stress import STRESS_SCENES
 from studies.scene.scene import ForceOutput, Held, Lumen, Organ, ReferencePlan
 from tests.studies.tiny import SQUEEZE
@@ -134,6 +134,13 @@ ODD = {
 def test_a_number_that_is_hardly_meant_is_a_warning(words):
     (sentence,) = check_scene(replace(SQUEEZE, **ODD[words]))
     assert words in sentence
+
+
+@pytest.mark.parametrize(("content", "told"), [("closed", [WEIGHTLESS]), ("open", [])])
+def test_what_fills_a_lumen_has_no_weight(content, told):
+    """The content of this stomach would be three times as heavy as its wall."""
+    hanging = replace(STOMACH_PRESS, obstacles=(), probed=None, lumen=Lumen(content), gravity=(0.0, 0.0, -9.81))
+    assert check_scene(hanging) == told and WEIGHTLESS not in check_scene(STOMACH_PRESS)
 
 
 def test_an_obstacle_that_goes_into_what_is_held_is_refused():
