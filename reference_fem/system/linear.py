@@ -59,9 +59,12 @@ def check_memory(needed: float, free: float, unknowns: int):
 @cache
 def load_pardiso():
     """The optional wrapper module, or None after one SlowSolverWarning in the life of the process."""
+    # Where pip puts MKL's library; without a path pypardiso searches the whole environment for it, for 1.6 s or more.
+    for path in sorted(Path(sys.prefix, "lib").glob("libmkl_rt*"))[:1]:
+        os.environ.setdefault("PYPARDISO_MKL_RT", str(path))
     try:
-        import pypardiso  # ImportError when the MKL library itself is missing
-    except ImportError as problem:
+        import pypardiso
+    except (ImportError, OSError) as problem:  # where the library is missing, or cannot be loaded
         warnings.warn(
             f"pypardiso is not usable ({problem}): SciPy's solver gives the same answers, five to twenty times "
             f"slower; for speed run {shlex.join([sys.executable, '-m', 'pip', 'install', 'pypardiso'])}",
@@ -69,7 +72,6 @@ def load_pardiso():
             stacklevel=3,
         )
         return None
-    # Without this path each new solver searches the whole environment for the library, for up to 1.6 s.
     os.environ.setdefault("PYPARDISO_MKL_RT", pypardiso.ps.libmkl._name)  # pyright: ignore[reportOptionalMemberAccess]
     return pypardiso
 

@@ -2,6 +2,9 @@
 
 import builtins
 import importlib.util
+import os
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -135,12 +138,13 @@ def test_both_backends_give_the_same_equilibrium():
     np.testing.assert_allclose(states[0].held_force, states[1].held_force, atol=1e-7)
 
 
-def test_missing_fast_solver_is_mentioned_once(monkeypatch):
+@pytest.mark.parametrize("error", [ImportError("not here"), OSError("libmkl_rt.so.3: file too short")])
+def test_missing_fast_solver_is_mentioned_once(monkeypatch, error):
     usual = builtins.__import__
 
     def without_pardiso(name, *args, **kwargs):
         if name == "pypardiso":
-            raise ImportError("not here")
+            raise error
         return usual(name, *args, **kwargs)
 
     monkeypatch.setattr(builtins, "__import__", without_pardiso)
@@ -154,6 +158,14 @@ def test_missing_fast_solver_is_mentioned_once(monkeypatch):
             linear.SymmetricSolver("pardiso")
     finally:
         linear.load_pardiso.cache_clear()
+
+
+@pytest.mark.skipif(len(BACKENDS) == 1, reason="pypardiso is not installed")
+def test_the_fast_solver_is_loaded_without_a_search():
+    """In a process of its own, in which it is loaded for the first time."""
+    searched = "import glob; glob.glob = None\nfrom reference_fem.system import linear\nassert linear.load_pardiso().ps"
+    environment = {name: value for name, value in os.environ.items() if name != "PYPARDISO_MKL_RT"}
+    subprocess.run([sys.executable, "-c", searched], check=True, env=environment)
 
 
 @pytest.mark.skipif(len(BACKENDS) == 1, reason="pypardiso is not installed")
