@@ -16,8 +16,9 @@ def crossed(triangles: np.ndarray, rest: np.ndarray, positions: np.ndarray) -> f
     beyond that at rest [1]. triangles: (s, 3), closed and outward."""
     area = triangle_areas(rest, triangles)
     depth = DEPTH * float(np.linalg.norm(np.ptp(rest, axis=0)))
-    inside = [area[_covered(triangles, x, depth)].sum() for x in (rest, *positions)]
-    return float(max(0.0, *np.subtract(inside[1:], inside[0])) / area.sum())
+    inside = max((area[_covered(triangles, x, depth)].sum() for x in positions), default=0.0)
+    before = area[_covered(triangles, rest, depth)].sum() if inside > 0.0 else 0.0
+    return float(max(0.0, inside - before) / area.sum())
 
 
 def _covered(triangles: np.ndarray, x: np.ndarray, depth: float) -> np.ndarray:
