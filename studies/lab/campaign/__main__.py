@@ -28,6 +28,8 @@ from studies.lab.campaign.outcome import JUDGED, Outcome, judge, told, two_meshe
 from studies.lab.commit import commit
 from studies.lab.population.intervals import PAIRS, pairs_of
 from studies.lab.refusal import refusal
+from studies.metrics.interval import OF_100
+from studies.metrics.judged import DISPLACEMENT, FORCE
 
 CELLS = [f"{told}, {truth}" for told in ("silent", "doubted") for truth in ("right", "wrong", "far", "undecided")]
 FINE, WORST_FIRST = ("silent, right", "doubted, right", "not ok", "refused"), [*CELLS, "crashed"]
@@ -97,6 +99,9 @@ def table_of(rows: list[dict[str, Any]], again: str) -> tuple[str, int]:
     far, doubted, right = counts["silent, far"], counts["doubted, right"], counts["silent, right"]
     lines.append(f"\nsilent and more than 3 targets off: {far} (allowed: 0)")
     lines.append(f"right but doubted: {doubted} of {doubted + right} (allowed: {100 * MOST_DOUBTED:.0f} %)")
+    for name, quantity in (("force", FORCE.name), ("displacement", DISPLACEMENT.name)):
+        inside = [held for _, one in bodies if (held := one.inside(name, quantity)) is not None]
+        lines.append(f"{name}s inside their interval: {sum(inside)} of {len(inside)} (of 100: {OF_100})")
     stopped = [row for row in rows if row["stopped"]]
     lines.append(f"members that did not end: {len(stopped)} of {len(rows)}")
     lines += [f"  {row['member']}: {row['title']}; {row['fault']}" for row in stopped]

@@ -81,6 +81,12 @@ class Outcome:
             return "undecided"
         return "right" if all(value <= target for value, _, target in known) else "wrong"
 
+    def inside(self, name: str, quantity: str) -> bool | None:
+        """Whether an error is within its interval; None without one, or where the reference does not decide it."""
+        error, bar, target = self.errors.get(quantity, (math.nan, math.inf, 0.0))
+        half = self.signs.get(f"within_{name}", math.nan)
+        return None if math.isnan(error) or math.isnan(half) or bar > BAR * target else abs(error) <= half
+
 
 Ended = list[tuple[Outcome, Run | None]]
 

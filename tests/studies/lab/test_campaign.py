@@ -72,6 +72,16 @@ def test_truth(force, mean, truth):
 
 
 @pytest.mark.parametrize(
+    ("force", "half", "inside"),
+    [((-1.2, 0.9, 3.0), 1.3, True), ((-1.2, 0.9, 3.0), 1.1, False), ((1.2, 1.1, 3.0), 1.3, None), (NONE, 1.3, None)],
+)
+def test_an_error_that_the_reference_decides_is_inside_its_interval_or_not(force, half, inside):
+    one = Outcome("", "", "ok", errors={"force_end": force}, signs={"within_force": half})
+    assert one.inside("force", "force_end") is inside
+    assert replace(one, signs={}).inside("force", "force_end") is one.inside("displacement", "mean_error") is None
+
+
+@pytest.mark.parametrize(
     ("told", "signs", "answer"),
     [
         ("ok", {}, "silent"),
@@ -125,6 +135,7 @@ def test_what_was_interrupted_continues_and_a_silent_body_that_is_far_off_fails(
     text = capfd.readouterr().out
     assert (
         "more than 3 targets off: 1 (" in text
+        and "forces inside their interval: 0 of 0 (of 100: 90)" in text
         and f"--results {tmp_path} --most {MOST:g} --seconds 900 --member 3\n" in text
         and text.count("member 1 is skipped: its organ is a scan") == 3
         and [text.count(f"{number}: ") for number in (2, 3)] == [1, 1]
