@@ -87,7 +87,8 @@ def record_of(
     end, held = history.final, prepared.setup.attachments
     places = [] if prepared.opening else regions(case.scene, prepared.body, held, end, float(history.t[-1]))
     signs |= {"missed_at_outlines": missed_at_outlines(prepared.body, places, end), "crossed": itself}
-    text = "; ".join(filter(None, [_warning_text(caught), *remarks(case.scene, signs)]))
+    odd = remarks(case.scene, signs, uniform=not case.body.graded)
+    text = "; ".join(filter(None, [_warning_text(caught), *odd]))
     attributes = {**_attributes(prepared, history), **signs, "warnings": text}
     return _record(case, status, message, attributes, fields)
 
