@@ -335,6 +335,12 @@ def test_what_lies_inside_the_body_itself_is_looked_for_at_checkpoints(monkeypat
     assert ("of the surface lies inside the body" in record.attributes["warnings"]) == (share == 0.003)
 
 
+def test_remarks_know_that_elements_have_one_size(monkeypatch, mesh_cache):
+    asked = []
+    monkeypatch.setattr(module, "remarks", lambda scene, signs, uniform: asked.append(uniform) or ["odd"])
+    assert record_of(tiny_case()).attributes["warnings"].endswith("odd") and asked == [True]
+
+
 def test_measure_checks_the_scene_as_the_command_does(mesh_cache):
     """The density of a stone is remarked on; a sphere inside the ball at the start stops the case."""
     case = tiny_case()
