@@ -210,7 +210,7 @@ def through_itself(share: float) -> str:
     """On a share of the surface [1] that lies inside the body."""
     return (
         f"up to {100 * share:.2g} % of the surface lies inside the body: no force acts where an organ touches itself, "
-        "but between faces of a cut with contact=True"
+        "except between the faces of a cut with contact=True"
     )
 
 
