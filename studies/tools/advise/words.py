@@ -43,9 +43,11 @@ def _verdict(answer: Advice) -> list[str]:
             f"{off_shape(answer.misshapen)}"
         )
     if answer.alike:
+        *others, last = answer.alike
+        those = f"the worst of {', '.join(others)} and {last}" if others else f"those of {last}"
         lines.append(
-            "no run of this scene is stored: errors, shape and step are the worst of "
-            f"{', '.join(answer.alike)}, scenes of the same kind"
+            f"no run of this scene is stored: errors, shape and step are {those}, loaded in the same way; "
+            "`organbench run` estimates the errors in this one"
         )
     if answer.beyond:
         lines.append(f"its loads are larger than any with which errors were measured: {answer.beyond}")

@@ -70,7 +70,7 @@ def test_a_scene_of_the_user_gets_the_worst_of_its_kind(advise, tmp_path):
     file = tmp_path / "mine.py"
     file.write_text(STUDY)
     out = advise(file, "--no-timing")
-    assert "no run of this scene is stored: errors, shape and step are the worst of liver_probe, kidney_probe" in out
+    assert "no run of this scene is stored: errors, shape and step are the worst of liver_probe and kidney_probe" in out
     assert "on another machine" in out and "in Python     Case(scene, QuadraticBody(nodes" in out
 
 
