@@ -139,7 +139,8 @@ def test_a_number_that_is_hardly_meant_is_a_warning(words):
 @pytest.mark.parametrize(("content", "told"), [("closed", [WEIGHTLESS]), ("open", [])])
 def test_what_fills_a_lumen_has_no_weight(content, told):
     """The content of this stomach would be three times as heavy as its wall."""
-    hanging = replace(STOMACH_PRESS, obstacles=(), probed=None, lumen=Lumen(content), gravity=(0.0, 0.0, -9.81))
+    held = ForceOutput("held", 0, (0.0, 0.0, -1.0))
+    hanging = replace(STOMACH_PRESS, obstacles=(), probed=held, lumen=Lumen(content), gravity=(0.0, 0.0, -9.81))
     assert check_scene(hanging) == told and WEIGHTLESS not in check_scene(STOMACH_PRESS)
 
 

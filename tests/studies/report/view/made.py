@@ -43,7 +43,7 @@ def reference_record(scene: Scene, status: Status = Status.OK) -> Record:
     values |= {"displacement": share[:, None, None] * bend(x), "volume": 1 + 0.1 * share}
     series = np.zeros(steps)
     mesh_sample = Sample("", 1, 1.0, bend(POINTS), series, 1 + 0.1 * share, series, series)
-    values |= sample_fields(SamplePoints(POINTS, CELLS), [mesh_sample] * 2, len(series))
+    values |= sample_fields(SamplePoints(POINTS, CELLS), [mesh_sample] * 3, len(series))
     return new_record(
         kind="reference",
         key=solve.key,
