@@ -168,11 +168,16 @@ def _unlike(run: Run) -> str:
     ended = next((one for one in (run, run.second) if one.record.status != Status.OK), None)
     if ended is not None:
         return f"the body with {ended.case.body.nodes:,} nodes is {ended.record.status}"
-    moving = np.nan_to_num([float(one.record.attributes.get("unsettled", NAN)) for one in (run, run.second)]).max()
-    if moving > RESTS:
-        return f"at the end the body is {PERCENT * moving:.2g} % of its displacement from rest"
+    away = from_rest(run, run.second)
+    if away > RESTS:
+        return f"at the end the body is {PERCENT * away:.2g} % of its displacement from rest"
     larger = beyond(run.case.scene, run.fields.rest)
     return f"outside: {larger}" if larger else ""
+
+
+def from_rest(*runs: Run) -> float:
+    """How far one of the bodies is from rest at the end, over its displacement [1]; 0 where none of them knows."""
+    return float(np.nan_to_num([run.record.attributes.get("unsettled", NAN) for run in runs]).max())
 
 
 def sentences(runs: Sequence[Run]) -> list[str]:

@@ -16,7 +16,19 @@ import pandas as pd
 
 from studies import Run, Status
 from studies.lab.commit import commit
-from studies.metrics.interval import OF_100, RULE_FILE, SIGNS, Apart, bound, group, scale, second_mesh, signs
+from studies.metrics.interval import (
+    OF_100,
+    RESTS,
+    RULE_FILE,
+    SIGNS,
+    Apart,
+    bound,
+    from_rest,
+    group,
+    scale,
+    second_mesh,
+    signs,
+)
 from studies.metrics.judged import DISPLACEMENT, FORCE
 from studies.metrics.wish import usual_wish
 from studies.scene.kind import load_of
@@ -42,6 +54,8 @@ def pairs_of(runs: Sequence[Run]) -> pd.DataFrame:
         other = second_mesh(fine.case, cases)
         if other is not None and (other.body.nodes, fine.case.body.nodes) == NODES:
             coarse, scene = ended[cases.index(other)], fine.case.scene
+            if from_rest(coarse, fine) > RESTS:  # they have no interval
+                continue
             both = list(zip(NODES, (coarse, fine), strict=True))
             organ = "scan" if scene.organ.shape == "file" else scene.organ.shape
             row = {"scene": scene.name, "organ": organ, "load": load_of(scene), **signs(coarse, fine)}
@@ -57,8 +71,9 @@ def rule_of(pairs: pd.DataFrame) -> dict[str, Any]:
     """The rule by the members of a table of pairs, none for a load with too few."""
     seen = {name: np.fmax if than == "more" else np.fmin for name, (_, than) in SIGNS.items()}  # both pass over NaN
     rule: dict[str, Any] = {"nodes": list(NODES)}
-    rule["seen"] = {name: float(end.reduce(pairs[name].to_numpy(float))) for name, end in seen.items()}
-    rule["loads"], kinds = sorted(set(pairs["load"])), pairs["load"].map(group).to_numpy(str)
+    judged = pairs.loc[pairs[[f"{name}_{n}" for name in Apart._fields for n in NODES]].notna().any(axis=1)]
+    rule["seen"] = {name: float(end.reduce(judged[name].to_numpy(float))) for name, end in seen.items()}
+    rule["loads"], kinds = sorted(set(judged["load"])), pairs["load"].map(group).to_numpy(str)
     for name in Apart._fields:
         change, shape, rule[name] = pairs[name].to_numpy(float), pairs["shape"].to_numpy(float), {}
         for kind in sorted(set(kinds[np.isfinite(change)])):

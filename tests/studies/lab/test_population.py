@@ -29,7 +29,7 @@ from studies.lab.population.ranges import RANGES, SQUEEZE, Filling, Palpation, S
 from studies.lab.population.rows import CODE, groups, merged, rows_of
 from studies.lab.population.study import STUDY, population_study
 from studies.lab.population.tables import FEW, members_of
-from studies.metrics.interval import RULE_FILE, bound
+from studies.metrics.interval import RULE_FILE, Apart, bound
 from studies.scene.as_json import scene_from_dict, scene_to_json
 from studies.scene.kind import load_of
 from tests.studies.made_up_run import POINTS, SCENE, bend, run
@@ -164,6 +164,11 @@ def test_pairs_have_what_two_meshes_show_and_the_errors_of_both():
     (row,) = pairs_of(runs).to_dict("records")
     unknown = [name for name, value in row.items() if name.startswith("force") and value != value]
     assert unknown == ["force", "force_1194", "force_1594"], "a reference that does not decide has no errors"
+    runs[1].record.attributes["unsettled"] = 0.011
+    assert pairs_of(runs).empty, "what is not at rest has no interval"
+
+
+UNKNOWN = [*Apart._fields, *(f"{name}_{nodes}" for name in Apart._fields for nodes in (1194, 1594))]
 
 
 def members(count, seed, organs=("liver", "kidney", "spleen"), scale=(1.0, 2.0, 0.5)):
@@ -189,6 +194,8 @@ def test_of_new_members_ninety_in_a_hundred_are_inside():
         for nodes in (1194, 1594):
             inside = new[f"{name}_{nodes}"] <= bound(rule[name]["other"], new[name], new["shape"], nodes)
             assert inside.mean() == pytest.approx(0.9, abs=0.03)
+    unknown = members(1, 3).assign(load="fill", shape=9.0, **dict.fromkeys(UNKNOWN, np.nan))
+    assert rule_of(pd.concat([members(300, 1), unknown])) == rule, "what the reference does not decide was not seen"
     assert (
         rule["loads"] == ["probe"]
         and rule["seen"]["facets"] == 9.0
