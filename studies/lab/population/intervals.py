@@ -1,7 +1,8 @@
 """`python -m studies.lab.population.intervals [FOLDER [PAIRS.csv ...]]`: the rule of studies.metrics.interval by the
-members in FOLDER/pairs.csv, default the published ones, and intervals.md, how it does on organs that it has not seen.
+members in FOLDER/pairs.csv and the random scenes in FOLDER/scenes.csv, default the published ones, and intervals.md,
+how it does on organs that it has not seen.
 
-Members of other files, those of campaigns, are added to FOLDER/pairs.csv.
+Rows of other files, those of campaigns, are added to FOLDER/scenes.csv.
 """
 
 import argparse
@@ -33,7 +34,7 @@ from studies.metrics.judged import DISPLACEMENT, FORCE
 from studies.metrics.wish import usual_wish
 from studies.scene.kind import load_of
 
-PUBLISHED, PAIRS = Path("results/published/population"), "pairs.csv"
+PUBLISHED, PAIRS, SCENES = Path("results/published/population"), "pairs.csv", "scenes.csv"
 NODES = 1194, 1594
 """Of the two meshes of `organbench run FILE.py`."""
 ERRORS = dict(zip(Apart._fields, (FORCE, DISPLACEMENT), strict=True))
@@ -128,9 +129,17 @@ def intervals_of(pairs: pd.DataFrame) -> str:
     return "\n".join(lines)
 
 
+def members_in(folder: Path) -> pd.DataFrame:
+    """All rows in a folder on which the rule rests."""
+    return pd.concat([pd.read_csv(path) for name in (PAIRS, SCENES) if (path := folder / name).is_file()])
+
+
 def main(folder: Path, *others: Path) -> None:
-    pairs = pd.concat(map(pd.read_csv, (folder / PAIRS, *others))).drop_duplicates("scene", keep="last")
-    pairs.to_csv(folder / PAIRS, index=False)
+    stored = [path for path in (folder / SCENES, *others) if path.is_file() or path in others]
+    if stored:
+        scenes = pd.concat(map(pd.read_csv, stored)).drop_duplicates("scene", keep="last")
+        scenes.to_csv(folder / SCENES, index=False)
+    pairs = members_in(folder)
     seeds = sorted(set(pairs["scene"].str.split("_").str[-2].astype(int)))
     rule = {"seeds": seeds, "commit": commit(), **rule_of(pairs)}
     RULE_FILE.write_text(json.dumps(rule, indent=2) + "\n", encoding="utf-8")

@@ -126,7 +126,7 @@ def _with_recipe(results: Path, case: Case, organ: str) -> Unseen | None:
     if len(rows) and (pairs := path.with_name(PAIRS)).is_file() and is_of_pairs(body):
         with _reading(pairs):
             more = pd.read_csv(pairs)
-            more = more.loc[more["scene"].map(organ_of) == organ]  # not those of a campaign, under other loads
+            more = more.loc[more["organ"] == organ]
             if len(more) >= len(rows):
                 force, displacement = (_sizes(more, name, body.nodes) for name in NAMES)
                 undecided = len(more) - displacement.count
