@@ -326,6 +326,7 @@ ROWS = [
       for organ in ("spleen", "bladder")),
     (PEOPLE, "The forces of kidney_0_005 differ by # %, and are # and # % off.", lambda: (
         of(rows("population", "pairs"), scene="kidney_0_005")[["force", "force_1194", "force_1594"]].iloc[0])),
+    (PEOPLE, "and # random scenes", lambda: [len(rows("population", "scenes"))]),
     (PEOPLE, "These have # of the 310 members", lambda: [rows("population")["scene"].nunique()]),
     (PEOPLE, "**With 1,194 nodes** # livers and # spleens miss a target", lambda: misses(1194, "liver", "spleen")),
     (PEOPLE, "takes # s for the first liver, # s for a kidney, # s for a stomach, # s for a spleen and # s for a "
