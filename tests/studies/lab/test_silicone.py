@@ -1,5 +1,6 @@
 """The silicone beam: how its files are read, its numbers, and the same beam in both solvers."""
 
+from collections import Counter
 from pathlib import Path
 
 import numpy as np
@@ -126,8 +127,10 @@ def test_the_published_table_is_read_back_and_drawn(tmp_path):
     rows = read_table(TABLE)
     write_table(tmp_path / "silicone.csv", rows)
     assert (tmp_path / "silicone.csv").read_bytes() == TABLE.read_bytes()
-    sheet, names = figure(rows, bars()), {row.who for row in rows} - {"measured"}
+    sheet, loads = figure(rows, bars()), Counter(row.who for row in rows if row.who != "measured")
+    names = {who for who, count in loads.items() if count == len(LOADS)}  # Drake hangs no masses
     lines = [line for line in sheet.axes[0].lines if np.size(line.get_xdata()) == len(LOADS)]
+    assert len(names) > 8
     assert len({(line.get_color(), line.get_marker()) for line in lines}) == len(lines) == len(names)
     reference = [row.sag for row in rows if row.who == "reference"]
     off = np.subtract(reference, [measured_row(load).sag for load in LOADS])
