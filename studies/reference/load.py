@@ -85,20 +85,14 @@ class Reference(Solution):
 def load_reference(root: Path, scene: Scene) -> Reference | None:
     """The stored reference of a scene; None for a scene without a plan.
 
-    Raises StudyError when it is missing or did not converge, or only its coarsest mesh did: with what would it agree?
+    Raises StudyError when it is missing, or did not converge.
     """
     if scene.reference is None:
         return None
     record = read_record(ReferenceSolve(scene).path(root))
     if record.status != Status.OK:
         raise StudyError(f"the reference of '{scene.name}' is {record.status}: {record.message}")
-    reference = Reference(scene, record)
-    if len(reference.meshes) < 2:
-        raise StudyError(
-            f"the reference of '{scene.name}' has no uncertainty, so it judges nothing: only its coarsest mesh was "
-            f"solved; {record.attributes['stopped']}"
-        )
-    return reference
+    return Reference(scene, record)
 
 
 def reference_for(root: Path, scene: Scene) -> Reference | None:

@@ -137,7 +137,9 @@ def solve_nested(scene: Scene, variants: Mapping[str, Varied]) -> FamilySolution
             break
     for part in latest.parts:
         part.system.solver.release()
-    return FamilySolution(latest.system.problem, equilibria, at, [*samples, *varied], latest.mesh.off, stopped)
+    alone = f"only the coarsest mesh was solved, so nothing says how accurate it is; {stopped}"
+    failure = "" if len(samples) > 1 else alone
+    return FamilySolution(latest.system.problem, equilibria, at, [*samples, *varied], latest.mesh.off, stopped, failure)
 
 
 def path_of(

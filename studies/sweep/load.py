@@ -66,23 +66,23 @@ def load_runs(root: Path, study: Study, references: References | None = None) ->
     references: those of a ledger of `root`, where other studies need them too.
     """
     references = references or References(Ledger(root))
-    runs, problems = list[Run](), list[StudyError]()
+    runs, problems = list[Run](), reference_problems(references, study)
     for job in (jobs := case_jobs(root, study)):
         run, missing = load_run(references, job, jobs)
         runs += [run] if run else []
         problems += missing
-    return runs, sentences([*reference_problems(references, study), *problems])
+    return runs, sentences([*problems, *references.warnings(study.scenes)])
 
 
 def table_rows(references: References, study: Study, metrics: Sequence[Metric]) -> tuple[list[Row], list[str]]:
     """A row per stored case (studies.metrics.table), and what is missing or damaged, or a reference warns
     of, in sentences. One run is in memory at a time, and its second mesh."""
-    rows, problems = list[Row](), list[StudyError]()
+    rows, problems = list[Row](), reference_problems(references, study)
     for job in (jobs := case_jobs(references.ledger.root, study)):
         run, missing = load_run(references, job, jobs)
         rows += [row_of(run, metrics)] if run else []
         problems += missing
-    return rows, sentences([*reference_problems(references, study), *problems])
+    return rows, sentences([*problems, *references.warnings(study.scenes)])
 
 
 def load_run(references: References, job: CaseJob, jobs: Sequence[CaseJob] = ()) -> tuple[Run | None, list[StudyError]]:
@@ -127,9 +127,8 @@ def frame_times(ledger: Ledger, job: CaseJob) -> FrameTiming | None:
 
 
 def reference_problems(references: References, study: Study) -> list[StudyError]:
-    """Of the scenes of a study that lack their reference, and warnings of those that were read, which come last."""
-    lacking = [problem for scene in study.scenes if (problem := references.problem(scene)) is not None]
-    return [*lacking, *references.warnings(study.scenes)]
+    """Of the scenes of a study that lack their reference."""
+    return [problem for scene in study.scenes if (problem := references.problem(scene)) is not None]
 
 
 def sentences(problems: Sequence[StudyError]) -> list[str]:

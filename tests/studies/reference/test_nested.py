@@ -151,6 +151,14 @@ def test_without_an_equilibrium_refinement_stops_and_names_the_reason(mesh_cache
     assert reference.total_uncertainty["force_end"] > 0.03
 
 
+def test_the_coarsest_mesh_alone_is_no_reference(mesh_cache, tmp_path, monkeypatch):
+    """It was stored as ok, and ended every table of its study, because it has no uncertainty."""
+    failing_from(monkeypatch, "refined", 0, SolveError("it folds"))
+    assert read_record(solve(tmp_path, ReferenceSolve(SMALL))).status == Status.NOT_CONVERGED
+    with pytest.raises(StudyError, match=r"only the coarsest mesh was solved, .* unknowns is left out: it folds"):
+        load_reference(tmp_path, SMALL)
+
+
 @pytest.mark.parametrize("number", [campaign(0), 3])
 def test_a_mesh_whose_carried_states_lead_nowhere_is_solved_from_rest(mesh_cache, monkeypatch, number):
     """All of its checkpoints, whether the last one fails or another."""

@@ -8,7 +8,7 @@ import pytest
 
 from studies.meshing.bounds import REFERENCE_SHAPE
 from studies.meshing.true_surface import true_surface
-from studies.metrics.table import OFF_SHAPE, metric
+from studies.metrics.table import OFF_SHAPE
 from studies.reference.load import load_reference, reference_for
 from studies.reference.published import FOLDER, judged_scenes
 from studies.reference.shape import shape_attributes, shape_of
@@ -16,7 +16,6 @@ from studies.report.page.markup import table
 from studies.scene.library import BALL_CLAMPED
 from studies.store.ledger import Ledger
 from studies.store.record import write_record
-from studies.store.schema import REFERENCE_FIELDS
 from studies.sweep.job import do, reference_jobs
 from studies.sweep.load import References, load_runs, table_rows
 from studies.sweep.standings import warnings_of
@@ -73,24 +72,6 @@ def test_one_beyond_the_bound_is_named_by_run_table_page_and_show(root, organben
     file.write_text("from tests.studies.reference.test_shape import STUDY\n")
     _, out, _ = organbench("show", file, "--results", root)
     assert words in " ".join(out.split())
-
-
-def test_the_coarsest_mesh_alone_is_no_reference_and_run_and_table_say_so(root):
-    """They showed nothing at all of the study."""
-    (job,) = reference_jobs(root, [SCENE])
-    record = load_reference(root, SCENE).record
-    alone = {
-        name: replace(field, values=field.values[:1])
-        for name, field in record.fields.items()
-        if REFERENCE_FIELDS[name].shape.startswith("f")
-    }
-    stopped = {"stopped": "the mesh of about 37008 unknowns is left out: it folds"}
-    write_record(job.path, replace(record, fields=record.fields | alone, attributes=record.attributes | stopped))
-    words = "no uncertainty, so it judges nothing: only its coarsest mesh was solved; the mesh of about 37008 unknowns"
-    (run,), remarks = load_runs(root, STUDY)
-    assert words in remarks[0] and run.reference is None
-    (row,), remarks = table_rows(References(Ledger(root)), STUDY, [metric("force_end")])
-    assert words in remarks[0] and np.isnan(row["force_end [%]"])
 
 
 def test_one_within_it_is_not(tmp_path):

@@ -42,8 +42,8 @@ def reference_record(scene: Scene, status: Status = Status.OK) -> Record:
     values |= {"t": np.array(scene.checkpoints), "nodes": x, "tetrahedra": np.ascontiguousarray(mesh.t.T)}
     values |= {"displacement": share[:, None, None] * bend(x), "volume": 1 + 0.1 * share}
     series = np.zeros(steps)
-    mesh_sample = Sample("", 1, 1.0, bend(POINTS), series, 1 + 0.1 * share, series, series)
-    values |= sample_fields(SamplePoints(POINTS, CELLS), [mesh_sample] * 3, len(series))
+    whole = Sample("", 1, 1.0, bend(POINTS), series, 1 + 0.1 * share, series, series)
+    values |= sample_fields(SamplePoints(POINTS, CELLS), [whole], len(whole.force))
     return new_record(
         kind="reference",
         key=solve.key,
