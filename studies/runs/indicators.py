@@ -169,13 +169,12 @@ def remarks(scene: Scene, signs: dict[str, float], uniform: bool = False) -> lis
         lines.append(
             f"the force oscillates by {percent:.2g} % at the end while nothing outside moves; {way_out(signs)}"
         )
-    left = signs["unsettled"] > (SETTLES if signs["heaviness"] > HEAVIER else SWINGS)
-    if left and not signs["swing"] > signs["unsettled"]:
-        percent = 100 * signs["unsettled"]
-        lines.append(f"at the end the body creeps, {percent:.2g} % from where it will rest; {way_out(signs)}")
-    elif signs["swing"] > SWINGS:
+    if signs["swing"] > SWINGS and not signs["unsettled"] > signs["swing"]:
         percent = 100 * signs["swing"]
         lines.append(f"the body swings by {percent:.2g} % at the end while nothing outside moves; {way_out(signs)}")
+    elif signs["unsettled"] > (SETTLES if signs["heaviness"] > HEAVIER else SWINGS):
+        percent = 100 * signs["unsettled"]
+        lines.append(f"at the end the body creeps, {percent:.2g} % from where it will rest; {way_out(signs)}")
     if abs(signs["pace"] - 1.0) > PACE:
         share, how = 100 * abs(signs["pace"] - 1.0), "fast" if signs["pace"] > 1.0 else "slow"
         lines.append(f"the motion is {share:.0f} % too {how}, by masses that are not the tissue's; take mass='lumped'")

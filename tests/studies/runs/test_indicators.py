@@ -194,6 +194,8 @@ def test_a_checkerboard_counts_and_a_gradient_does_not():
         ({"unsettled": 2 * SWINGS}, "creeps, 2 % from where it will rest; give the scene more"),
         ({"unsettled": 0.066, "swing": 0.021}, "creeps, 6.6 % from where it will rest"),
         ({"unsettled": 0.02, "swing": 0.021}, "swings by 2.1 %"),
+        ({"unsettled": np.nan, "swing": 0.021}, "swings by 2.1 %"),
+        ({"unsettled": 0.005, "swing": 0.008, "heaviness": 4.0}, "creeps, 0.5 % from where it will rest"),
         ({"unsettled": 0.005, "heaviness": 4.0}, "creeps, 0.5 % from where it will rest; take mass="),
         ({"unbalanced": 0.07}, "up to 7 % of the force moves the body instead of deforming it; load more slowly"),
         ({"unbalanced": 0.07, "heaviness": 4.0}, "deforming it; take mass='stiffness'"),
