@@ -22,7 +22,7 @@ class NewtonSettings:
     within 3e-4 of that with a tolerance of 1e-5."""
     penalty: float = 1500.0
     """Contact penalty times facet size over mu. A softer penalty needs more updates of the multiplier."""
-    max_iterations: int = 25
+    max_iterations: int = 16
     smallest_step: float = 1.0 / 1024.0
     """Smallest sub-step, as a fraction of the interval between two wanted times."""
     start: float = 0.0

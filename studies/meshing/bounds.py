@@ -24,6 +24,9 @@ its held region (docs/accuracy.md)."""
 FEW = 8
 """Fewer facets under a probe are marked: a sphere of 5 mm radius that presses an ellipsoid of 100 mm by 8 touches three
 of 594 nodes, its force −4 %, and two of 300, +71 %."""
+UNDER_TOOL, REFERENCE_UNDER_TOOL = 2.5, 1.25
+"""Longest side of the facets under a tool, over its radius, before elements are halved where errors are large: of
+bodies and of references. A sphere pushed in by 1.6 radii slipped through reference elements at 2.7, not at 2.5."""
 SIDE = 3.5
 """Longest side of the facets under a probe, over its radius, in a body that is touched inside facets: 2.8 of those 594
 nodes, 3.8 of those 300."""

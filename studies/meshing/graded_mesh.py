@@ -7,7 +7,9 @@ import numpy as np
 from studies.base.errors import StudyError
 from studies.geometry import OrganMesh
 from studies.geometry.surface.node_count import FEWEST, MOST
+from studies.meshing.bounds import UNDER_TOOL
 from studies.meshing.held_mesh import HeldMesh, held_mesh
+from studies.meshing.moving_tools import fine_under_tools
 from studies.meshing.quadratic_mesh import QuadraticMesh
 from studies.meshing.scene_mesh import mesh_for
 from studies.meshing.shaping import all_facets, linear_mesh, quadratic_mesh
@@ -77,6 +79,8 @@ def halved(
     organ_mesh = mesh_for(scene, level, layers=1 if is_hollow(scene) else None, on_shape=on_shape, even=even)
     coarse = held_mesh(scene, organ_mesh)
     fine = coarse.refined(scene, at_outlines, at_contact)
+    if at_contact > 0:
+        fine = fine_under_tools(scene, fine, UNDER_TOOL)
     return organ_mesh, coarse, coarse if fine.mesh.nelements == coarse.mesh.nelements else fine
 
 

@@ -5,13 +5,13 @@ from collections.abc import Callable
 
 import numpy as np
 
-from massspring import Capsule, Sphere
 from massspring.world.depth import facets_within
 from studies.base.errors import StudyError
 from studies.geometry import OrganMesh
 from studies.geometry.mesh.organ_mesh import triangle_areas
 from studies.geometry.surface.sides import along_facets, region_area
 from studies.meshing.bounds import FACETS, FEW, HELD_AREA, REFUSED_AREA, SIDE
+from studies.meshing.moving_tools import moments_of, moving_tools
 from studies.meshing.quadratic_mesh import QuadraticMesh
 from studies.meshing.rest_surface import OUTER, rest_surfaces
 from studies.meshing.scene_mesh import patch_nodes
@@ -23,8 +23,6 @@ from studies.scene.scene import Held, Organ, Scene
 TOUCHED = 0.6
 """Facets that touch a probe at the end over those whose rest position is inside its final position: 0.5 to 0.8 for 40
 pressed livers and stomachs; in Hertz's contact half of the area."""
-MOMENTS = 400
-"""Most moments looked at between two keys of a path."""
 FINER = 1.08
 """Ratio of the numbers of vertices of successive meshes in the search for one that keeps the area of all held regions:
 one mesh may cut off a held end of the organ, and the next finer one not."""
@@ -72,7 +70,7 @@ def check_reach(scene: Scene, mesh: OrganMesh | QuadraticMesh, at_nodes: bool) -
     outer = outer_facets(mesh)
     corners = mesh.points[outer[:, :3]]
     sides = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
-    for number, probe in _probes(scene):
+    for number, probe in moving_tools(scene):
         times = moments_of(probe)
         met = np.any([facets_within(probe, mesh.points, outer, t) for t in times], axis=0)
         if not met.any():
@@ -91,24 +89,6 @@ def check_reach(scene: Scene, mesh: OrganMesh | QuadraticMesh, at_nodes: bool) -
         )
 
 
-def _probes(scene: Scene) -> list[tuple[int, Sphere | Capsule]]:
-    """The moving spheres and capsules with their numbers."""
-    return [
-        (number, one)
-        for number, one in enumerate(scene.obstacles)
-        if isinstance(one, Sphere | Capsule) and top_speed(one.path) > 0
-    ]
-
-
-def moments_of(probe: Sphere | Capsule) -> list[float]:
-    """Times [s] between which an obstacle moves by at most half its radius: all where it stops or turns, and more."""
-    times = np.array(probe.path.times)
-    ways = np.linalg.norm(np.diff(probe.path(times), axis=0), axis=1)
-    parts = np.ceil(2.0 * ways / probe.radius).astype(int).clip(1, MOMENTS)
-    between = [np.linspace(times[k], times[k + 1], int(n), endpoint=False) for k, n in enumerate(parts)]
-    return np.concatenate([*between, times[-1:]]).tolist()
-
-
 def outer_facets(mesh: OrganMesh | QuadraticMesh) -> np.ndarray:
     """Facets of the outer surface, (f, 3 or 6)."""
     if isinstance(mesh, QuadraticMesh):
@@ -119,7 +99,7 @@ def outer_facets(mesh: OrganMesh | QuadraticMesh) -> np.ndarray:
 def touched_facets(scene: Scene, mesh: OrganMesh | QuadraticMesh) -> float | None:
     """Estimated number of outer facets that a moving sphere or capsule touches where it touches most, the smallest over
     all of them; None without one."""
-    probes = _probes(scene)
+    probes = moving_tools(scene)
     if not probes or not scene.checkpoints:
         return None
     outer = outer_facets(mesh)

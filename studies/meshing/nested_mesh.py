@@ -13,9 +13,10 @@ from studies.base.errors import StudyError
 from studies.geometry.mesh.organ_mesh import tetrahedron_volumes
 from studies.geometry.mesh.quality import smallest_jacobian
 from studies.geometry.surface.distance import distance_to_surface
-from studies.meshing.bounds import HELD_AREA, REFERENCE_SHAPE
+from studies.meshing.bounds import HELD_AREA, REFERENCE_SHAPE, REFERENCE_UNDER_TOOL
 from studies.meshing.held_mesh import HeldMesh, held_mesh, rim_sides
 from studies.meshing.kept_shape import area_error, level_that_holds
+from studies.meshing.moving_tools import fine_under_tools
 from studies.meshing.opened_mesh import opened_elements
 from studies.meshing.reference_mesh import on_true_sides
 from studies.meshing.rest_surface import rest_surfaces
@@ -203,7 +204,7 @@ def base_mesh(scene: Scene, surface_nodes: int, at_contact: int) -> NestedMesh:
 def _base_mesh(scene: Scene, surface_nodes: int, at_contact: int) -> NestedMesh:
     organ_mesh = mesh_for(scene, surface_nodes, on_shape=True)
     coarse = held_mesh(scene, organ_mesh)
-    body = coarse.refined(scene, 0, at_contact)
+    body = fine_under_tools(scene, coarse.refined(scene, 0, at_contact), REFERENCE_UNDER_TOOL)
     points, shape = nodes(on_true_sides(scene, organ_mesh, coarse, body)), true_shape(scene.organ)
     if shape is not None and not smallest_jacobian(points, element_nodes(body.mesh)).min() > 0.0:
         # An element may fold between its integration points; its parts would then fold at theirs.

@@ -19,10 +19,11 @@ from studies.base.errors import StudyError
 from studies.geometry import OrganMesh
 from studies.geometry.mesher.jobs import cached
 from studies.geometry.surface.node_count import FEWEST
-from studies.meshing.bounds import HELD_AREA
+from studies.meshing.bounds import HELD_AREA, UNDER_TOOL
 from studies.meshing.graded_mesh import check_number, halved, is_hollow, middles, outer_nodes
 from studies.meshing.held_mesh import HeldMesh
 from studies.meshing.kept_shape import held_area_error, level_that_holds
+from studies.meshing.moving_tools import fine_under_tools
 from studies.meshing.nested_mesh import edges_of, marked
 from studies.meshing.opened_mesh import opened_elements
 from studies.meshing.quadratic_mesh import QuadraticMesh
@@ -59,7 +60,8 @@ def adaptive_mesh(scene: Scene, number: int) -> QuadraticMesh:
     if reason is not None:
         raise StudyError(f"scene '{scene.name}' has no adaptive bodies: {reason}; choose graded=True")
     check_number(scene, number, quadratic=True)
-    organ_mesh, coarse = coarse_mesh(scene, number)
+    organ_mesh, whole = coarse_mesh(scene, number)
+    coarse = fine_under_tools(scene, whole, UNDER_TOOL)
     few = outer_nodes(coarse, quadratic=True)
     if few > number:
         raise StudyError(f"scene '{scene.name}': its coarse mesh has {few} surface nodes already; ask for more")
@@ -72,10 +74,10 @@ def adaptive_mesh(scene: Scene, number: int) -> QuadraticMesh:
     shape = {"points": organ_mesh.points, "tetrahedra": organ_mesh.tetrahedra}
     names = "indicator", "stretch"
     arrays = cached(
-        recipe, shape, names, lambda: dict(zip(names, indicators_of(scene, organ_mesh, coarse), strict=True))
+        recipe, shape, names, lambda: dict(zip(names, indicators_of(scene, organ_mesh, whole, coarse), strict=True))
     )
     fine = adapted(coarse, arrays["indicator"], number, least_edge(coarse, arrays["stretch"]))
-    return quadratic_mesh(scene, organ_mesh, coarse, fine, middles(scene))
+    return quadratic_mesh(scene, organ_mesh, whole, fine, middles(scene))
 
 
 def coarse_mesh(scene: Scene, number: int) -> tuple[OrganMesh, HeldMesh]:
@@ -108,13 +110,15 @@ def why_not(scene: Scene) -> str | None:
     return NOT_ADAPTIVE.get(load_of(scene))
 
 
-def indicators_of(scene: Scene, organ_mesh: OrganMesh, coarse: HeldMesh) -> tuple[np.ndarray, np.ndarray]:
+def indicators_of(
+    scene: Scene, organ_mesh: OrganMesh, whole: HeldMesh, coarse: HeldMesh
+) -> tuple[np.ndarray, np.ndarray]:
     """Error indicator over its largest value, and largest principal stretch of the corners, both (ne,), of the elements
-    of the coarse body at the last checkpoint; the body is opened along the scene's cuts.
+    of the coarse body, parts of those of `whole`, at the last checkpoint; the body is opened along the scene's cuts.
 
     Raises StudyError if no equilibrium is found."""
     try:
-        mesh = on_true_sides(scene, organ_mesh, coarse, coarse)
+        mesh = on_true_sides(scene, organ_mesh, whole, coarse)
         *held, wall = coarse.facets(mesh)
         middle = nodes(mesh)[wall[:, :3]].mean(axis=1)
         patches = [np.unique(facets) for facets in held]

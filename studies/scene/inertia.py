@@ -25,7 +25,7 @@ def why_inertia_matters(scene: Scene) -> str | None:
     wave = float(np.sqrt(scene.tissue.shear_modulus / scene.tissue.density))
     for path in [moving.path for moving in (*scene.obstacles, *scene.held)]:
         if turns(path):
-            return "an obstacle or clamped region rotates"
+            return "an obstacle or clamped region changes its direction"
         if top_speed(path) > SLOW * wave:
             return (
                 f"an obstacle or clamped region moves at {1e3 * top_speed(path):.3g} mm/s, "

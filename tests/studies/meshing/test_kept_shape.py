@@ -17,7 +17,6 @@ from studies.meshing.kept_shape import (
     held_area_error,
     held_facets,
     level_that_holds,
-    moments_of,
     tell_shape,
     touched_facets,
 )
@@ -115,13 +114,6 @@ def test_a_tool_that_passes_between_all_nodes_is_refused(radius, refused):
         check_reach(scene, mesh, at_nodes)  # what is held moves: where the body will be is not known
     away = Trajectory((0.0, 1.0), ((0.0, 0.0, 0.0), (0.03, 0.0, 0.0)))
     check_reach(replace(still, obstacles=(Sphere(tuple(start), radius, away),)), mesh, True)
-
-
-def test_moments_leave_no_gap_wider_than_half_the_radius():
-    path = Trajectory((0.0, 1.0, 1.5, 4.0), ((0.0, 0.0, 0.0), (0.02, 0.0, 0.0), (0.02, 0.0, 0.0), (0.0, 0.01, 0.0)))
-    times = moments_of(Sphere((0.0, 0.0, 0.0), 0.003, path))
-    assert set(path.times) <= set(times) and times == sorted(set(times))
-    assert np.linalg.norm(np.diff(path(np.array(times)), axis=0), axis=1).max() <= 0.0015 + 1e-12
 
 
 def test_a_file_that_comes_as_it_is_has_its_own_shape(tmp_path):

@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from massspring import Sphere, Trajectory
 from reference_fem import nodes
 from reference_fem.system.saddle_point import System
 from studies.base.errors import StudyError
@@ -94,7 +95,7 @@ def test_the_stretch_of_a_uniform_deformation_is_its_largest(monkeypatch):
         on_checkpoint(SimpleNamespace(state=SimpleNamespace(x=x)))
 
     monkeypatch.setattr(module, "equilibrium_path", moved)
-    _, stretch = indicators_of(BALL_CLAMPED, organ_mesh, coarse)
+    _, stretch = indicators_of(BALL_CLAMPED, organ_mesh, coarse, coarse)
     assert stretch == pytest.approx(np.full(coarse.mesh.nelements, np.linalg.norm(gradient, 2)), rel=1e-12)
 
 
@@ -128,6 +129,18 @@ def test_a_coarse_mesh_that_loses_what_is_held_is_left_for_a_finer_one(monkeypat
     assert levels == [first, round(1.08 * first)]
 
 
+def test_a_thin_tool_does_not_slip_through_the_coarse_body(mesh_cache):
+    """A sphere of 3 mm radius, pushed in by 6 mm: whole, the coarse body has facets with sides of 26 mm."""
+    radius, top = 0.003, BALL_CLAMPED.organ.parameters["radius"]
+    path = Trajectory((0.0, BALL_CLAMPED.checkpoints[-1]), ((0.0, 0.0, 0.0), (0.0, -0.006, 0.0)))
+    tool = Sphere((0.0, top + radius, 0.0), radius, path)
+    scene = replace(BALL_CLAMPED, held=BALL_CLAMPED.held[:1], obstacles=(tool,))
+    organ_mesh, whole = coarse_mesh(scene, 400)
+    with pytest.raises(StudyError, match="slips through"):
+        indicators_of(scene, organ_mesh, whole, whole)
+    assert 400 <= adaptive_mesh(scene, 400).outer_count < 420
+
+
 @pytest.mark.parametrize(
     ("scene", "reason"),
     [(BALL_SQUEEZE, "nothing holds"), (BALL_RINGING, "nothing holds|no static")],
@@ -147,4 +160,4 @@ def test_a_coarse_body_without_an_equilibrium_is_a_sentence(monkeypatch):
     monkeypatch.setattr(module, "equilibrium_path", fails)
     organ_mesh, coarse = coarse_mesh(LIVER_PROBE, NODES)
     with pytest.raises(StudyError, match=r"no solution by which to adapt \(no step\); choose graded=True"):
-        indicators_of(LIVER_PROBE, organ_mesh, coarse)
+        indicators_of(LIVER_PROBE, organ_mesh, coarse, coarse)

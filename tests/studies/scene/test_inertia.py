@@ -39,8 +39,8 @@ def test_scenes_whose_reference_is_a_load_path_allow_any_masses(scene):
         (FALLING, "it falls"),
         (replace(BALL_RINGING, start=None), "motion in time"),
         (replace(BALL_SQUEEZE, obstacles=(plane(0.0, -0.02),)), "20 mm/s"),
-        (replace(BALL_SQUEEZE, obstacles=(plane(0.0, -0.005, 0.0),)), "rotates"),
-        (replace(BALL_CLAMPED, held=(replace(BALL_CLAMPED.held[1], path=plane(0.0, 0.005, 0.0).path),)), "rotates"),
+        (replace(BALL_SQUEEZE, obstacles=(plane(0.0, -0.005, 0.0),)), "changes its direction"),
+        (replace(BALL_CLAMPED, held=(replace(BALL_CLAMPED.held[1], path=plane(0.0, 0.005, 0.0).path),)), "changes its"),
     ],
     ids=lambda value: value if isinstance(value, str) else "",
 )
