@@ -29,8 +29,8 @@ def test_adaptive_bodies_press_a_thin_sphere_as_the_reference_does(mesh_cache, t
         probed=ForceOutput("obstacle", 0, (0.0, 0.0, -1.0)),
         reference=ReferencePlan(),
     )
-    truth = solve_reference(tmp_path, scene).field("sample_force")[0, 0]
-    assert abs(solve_reference(tmp_path, scene).field("sample_force")[1, 0] / truth - 1.0) < 0.01, "two meshes agree"
+    truth, coarser = solve_reference(tmp_path, scene).field("sample_force")[:2, 0]
+    assert abs(coarser / truth - 1.0) < 0.01
     ends = []
     for graded in ("adaptive", False):
         body = QuadraticBody(nodes, graded=graded, mass="stiffness")
