@@ -35,8 +35,9 @@ SWINGS = 0.01
 """Bound of the swing at rest, and of the way to rest of a body that creeps: of displacements it is the target of the
 mean error."""
 SETTLES = 0.003
-"""The second of a body heavier than its tissue, which promises the end of a lighter one. A ball that stands on a small
-cap, 25 times as heavy, and nearly topples under its weight was 0.9 % from rest with 0.007, 0.08 % with 0.0009."""
+"""The second of a body heavier than its tissue, which promises the end of a lighter one."""
+SLOWEST = 0.9
+"""Largest share of its way in one span that a body is taken to move in the next: with noise the ratio may be any."""
 LESS = "halve the step, or take a method with a smaller tolerance"
 """What ends a gain: contact that answers a step late feeds energy in, and so does what multipliers leave of volumes."""
 SHORTENED = 2.0
@@ -64,11 +65,9 @@ MOVES, PACE = 1e-3, 0.02
 """Kinetic energy over the largest energy from which a run shows a motion, and bound of the error of its pace."""
 
 
-def indicators(
-    scene: Scene, body: Body, history: History, lumen: int, keeps: bool, steps: int, damping: float | None = None
-) -> dict[str, float]:
+def indicators(scene: Scene, body: Body, history: History, lumen: int, keeps: bool, steps: int) -> dict[str, float]:
     """Attributes of a run (RUN_ATTRIBUTES); NaN if they do not apply. lumen: column of the lumen, or −1; keeps: whether
-    the method claims to keep volumes; steps: of a frame at rest; damping: at the end [1/s], if not the scene's."""
+    the method claims to keep volumes; steps: of a frame at rest."""
     pressure = history.pressure[history.good_frames - 1] if history.good_frames else history.pressure[:0]
     alternation = unlike_neighbours(pressure, neighbours(body.kept, lumen)) if len(pressure) else np.nan
     return {
@@ -81,7 +80,7 @@ def indicators(
         "pace": pace(history),
         "heaviness": float(body.moved_mass.sum() / body.mass.sum()),
         "unbalanced": unbalanced(scene, body, history),
-        "unsettled": unsettled(scene, history, scene.damping if damping is None else damping),
+        "unsettled": unsettled(scene, body, history),
         "shortened": float(history.steps.max()) / steps,
     }
 
@@ -133,23 +132,29 @@ def unbalanced(scene: Scene, body: Body, history: History) -> float:
     return float(left.max() / (force.max() or np.inf))
 
 
-def unsettled(scene: Scene, history: History, damping: float) -> float:
-    """Share of its displacement by which a held body is not where it will come to rest [1]; NaN where no load rests,
-    and for a free one, which may drift for ever.
+def resting_frames(scene: Scene, t: np.ndarray) -> list[int]:
+    """Numbers (1 … F) of three frames at equal distances, the last at the end `t` (F,) [s]; the second half of the time
+    for which all loads rest. Empty if that is shorter than four frames."""
+    still = int((t > still_from(scene)).sum())
+    return [len(t) - 2 * (still // 4), len(t) - still // 4, len(t)] if still >= 4 else []
 
-    Of a swing it is that of its speed; a body that creeps, with more than critical damping c [1/s], is farther away:
-    with x'' + c x' + ω² x = 0 and x ~ exp(−r t), ω² x²/x'² = (c − r)/r. Of r no less is seen than 1 over the time.
+
+def unsettled(scene: Scene, body: Body, history: History) -> float:
+    """Mean way of the nodes of a held body from where they are to where they will come to rest, over its largest
+    displacement [1]; NaN where no load rests, and for a free body, which may drift for ever.
+
+    What a body that creeps moves in the last span is q times what it moves in the one before, and in all later ones
+    together q/(1 − q) times as much (Aitken 1926). Where that is less, and of a swing, it is the way in the last span.
     """
-    t = history.t[: history.good_frames]
-    parts = np.array_split(np.flatnonzero(t > still_from(scene)), 4)
-    if not scene.held or not len(parts[3]):
+    frames = resting_frames(scene, history.t)
+    if not scene.held or not frames or not np.isin(frames, history.snapshot_frames).all():
         return float("nan")
-    if not damping > 0.0:
-        return swing(scene, history)
-    (before, after), time = (history.kinetic[part].max() for part in parts[2:]), t[-1] - t[parts[0][0]]
-    rate = 2.0 / time * np.log(before / after) if before > after > 0.0 else 0.0  # a quarter apart; energy falls twice
-    rate = min(max(rate, 1.0 / time), 0.5 * damping)
-    return swing(scene, history) * float(np.sqrt((damping - rate) / rate))
+    before, middle, end = history.snapshots[np.searchsorted(history.snapshot_frames, frames)]
+    earlier, later = middle - before, end - middle
+    q = float((earlier * later).sum() / ((earlier**2).sum() or np.inf))
+    q = min(max(q, 0.5), SLOWEST)
+    way, moved = (np.linalg.norm(x, axis=1) for x in (later, end - body.rest))
+    return float(way.mean() * q / (1.0 - q) / (moved.max() or np.inf))
 
 
 def remarks(scene: Scene, signs: dict[str, float], uniform: bool = False) -> list[str]:
@@ -174,7 +179,8 @@ def remarks(scene: Scene, signs: dict[str, float], uniform: bool = False) -> lis
         lines.append(f"the body swings by {percent:.2g} % at the end while nothing outside moves; {way_out(signs)}")
     elif signs["unsettled"] > (SETTLES if signs["heaviness"] > HEAVIER else SWINGS):
         percent = 100 * signs["unsettled"]
-        lines.append(f"at the end the body creeps, {percent:.2g} % from where it will rest; {way_out(signs)}")
+        out = way_out(signs, "give the scene more time at rest, or less damping")
+        lines.append(f"at the end the body creeps, {percent:.2g} % from where it will rest; {out}")
     if abs(signs["pace"] - 1.0) > PACE:
         share, how = 100 * abs(signs["pace"] - 1.0), "fast" if signs["pace"] > 1.0 else "slow"
         lines.append(f"the motion is {share:.0f} % too {how}, by masses that are not the tissue's; take mass='lumped'")
@@ -220,11 +226,11 @@ def volume_off(history: History) -> float:
     return float(np.abs(volume / target - 1.0).max(initial=0.0)) if len(volume) else float("nan")
 
 
-def way_out(signs: dict[str, float]) -> str:
-    """What ends an oscillation: that of a sound run decays."""
+def way_out(signs: dict[str, float], time: str = "give the scene more damping or more time at rest") -> str:
+    """What ends an oscillation: that of a sound run decays in `time`."""
     if signs["gained"] > FEEDS:
         return LESS
-    return LIGHTER if signs["heaviness"] > HEAVIER else "give the scene more damping or more time at rest"
+    return LIGHTER if signs["heaviness"] > HEAVIER else time
 
 
 def neighbours(kept: Volumes | PointVolumes, lumen: int) -> np.ndarray:

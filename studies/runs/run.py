@@ -18,7 +18,7 @@ from studies.runs.case import Case, case_from_json
 from studies.runs.crossing import crossed
 from studies.runs.current import case_fingerprint, case_path
 from studies.runs.cutting import LUMEN
-from studies.runs.indicators import indicators, remarks
+from studies.runs.indicators import indicators, remarks, resting_frames
 from studies.runs.limits import TIME_LIMIT
 from studies.runs.outlines import missed_at_outlines, regions
 from studies.runs.prepare import Prepared, prepare
@@ -82,8 +82,7 @@ def record_of(
     status, message = status_of(case, history, itself)
     keeps = case.method.volume_tol is not None
     clock = prepared.setup.clock
-    damping = prepared.setup.damping_in(clock.frames - 1)
-    signs = indicators(case.scene, prepared.body, history, _lumen_column(prepared), keeps, clock.steps, damping)
+    signs = indicators(case.scene, prepared.body, history, _lumen_column(prepared), keeps, clock.steps)
     end, held = history.final, prepared.setup.attachments
     places = [] if prepared.opening else regions(case.scene, prepared.body, held, end, float(history.t[-1]))
     signs |= {"missed_at_outlines": missed_at_outlines(prepared.body, places, end), "crossed": itself}
@@ -104,10 +103,11 @@ def checkpoint_frames(case: Case, prepared: Prepared) -> list[int]:
 
 
 def snapshot_frames(case: Case, prepared: Prepared) -> list[int]:
-    """Numbers of the frames after which positions are kept: those at checkpoints, and those at which the surface is
-    recorded."""
-    at = checkpoint_frames(case, prepared)
-    return moments(prepared.setup.clock.frames, at) if "surface" in case.recorded else at
+    """Numbers of the frames after which positions are kept: those at checkpoints, those that tell whether the body
+    rests, and those at which the surface is recorded."""
+    clock, at = prepared.setup.clock, checkpoint_frames(case, prepared)
+    shown = moments(clock.frames, at) if "surface" in case.recorded else at
+    return sorted({*shown, *resting_frames(case.scene, clock.frame * np.arange(1, clock.frames + 1))})
 
 
 def _record(case: Case, status: Status, message: str, attributes: dict, fields: dict[str, Field]) -> Record:

@@ -7,7 +7,8 @@ from studies.runs.prepare import Prepared
 from studies.store.schema import SURFACE
 
 MOMENTS = 60
-"""Number of evenly spaced times over the duration; start, checkpoints and last frame are added."""
+"""Number of evenly spaced times over the duration; start, checkpoints, last frame and those of `resting_frames` are
+added."""
 
 
 def moments(frames: int, checkpoints: list[int]) -> list[int]:
@@ -17,7 +18,7 @@ def moments(frames: int, checkpoints: list[int]) -> list[int]:
 
 
 def surface_fields(prepared: Prepared, history: History) -> dict[str, np.ndarray]:
-    """The fields SURFACE of a run whose snapshots are at `moments`: from the start to the last good frame.
+    """The fields SURFACE of a run: at its snapshots, `moments` among them, from the start to the last good frame.
 
     Positions (P, v, 3) [m] are rounded to float32, to 6e-8 of their distance from the origin.
     """

@@ -149,7 +149,7 @@ class RunAttributes(Timed):
     damping_moving = optional_value(float, "1/s", "damping of a heavy body while loads move; else the scene's")
     damping_at_rest = optional_value(float, "1/s", "the same where nothing moves")
     unbalanced = optional_value(float, "1", "force at a checkpoint that moves the body, over the largest force")
-    unsettled = optional_value(float, "1", "way of the body to rest at the end, over its displacement")
+    unsettled = optional_value(float, "1", "mean way of the nodes to rest at the end, over the largest displacement")
     crossed = optional_value(float, "1", "share of the surface inside the body itself, the most at a checkpoint")
     missed_at_outlines = optional_value(float, "1", "error by coarse elements where held tissue or contact ends")
     warnings = value(str, "", "what preparing the case warned of, and what its indicators report")

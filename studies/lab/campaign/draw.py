@@ -42,8 +42,6 @@ SOLID = replace(MEMBER, tolerance=0.008, most=MOST, base=600)
 HOLLOW, SCAN = replace(SOLID, tolerance=0.02), 1000
 """Plans of references with bars below a third of the targets that keep the shape within .5 % of the size, and the
 surface nodes that this takes on a scan; a few minutes of a core."""
-SIDE = 1.2
-"""Square of the side of a facet over the area of the surface per node, twice that of a facet: 2 √(4/3) / 2."""
 WITHOUT_FORCE = "surface", "interior", "silhouette", "volume"
 """What is compared where the force is the weight, or inside."""
 
@@ -91,20 +89,15 @@ def member(seed: int, number: int, scans: Sequence[Path] = ()) -> Scene:
             continue
         if load != "gravity" and rng.random() < ALSO:
             loaded = replace(loaded, gravity=_gravity(rng), title=f"{loaded.title}, under gravity")
-        return replace(loaded, reference=_plan(loaded, hollow, float(place.areas.sum())))
+        return replace(loaded, reference=_plan(loaded, hollow))
     raise StudyError(f"{scene.name}: no place for its load ({load}) in {TRIES} tries")
 
 
-def _plan(scene: Scene, hollow: bool, area: float) -> ReferencePlan:
-    """Of the reference: its coarsest mesh has facets under a sphere or capsule with sides of at most its radius, and is
-    halved there at least as often as in any plan."""
-    plan, radii = HOLLOW if hollow else SOLID, [getattr(one, "radius", np.inf) for one in scene.obstacles]
+def _plan(scene: Scene, hollow: bool) -> ReferencePlan:
+    """Of the reference: only under spheres and capsules its coarsest mesh is halved."""
+    plan = HOLLOW if hollow else SOLID
     plan = replace(plan, base=SCAN) if "path" in scene.organ.parameters else plan
-    thin = min(radii, default=np.inf)
-    if thin == np.inf:
-        return replace(plan, at_contact=0)
-    side = (SIDE * area / plan.base) ** 0.5
-    return replace(plan, at_contact=max(plan.at_contact, int(np.ceil(np.log2(side / thin)))))
+    return plan if any(isinstance(one, Sphere | Capsule) for one in scene.obstacles) else replace(plan, at_contact=0)
 
 
 def _organ(rng: np.random.Generator, scans: Sequence[Path]) -> tuple[Organ, Tissue]:
