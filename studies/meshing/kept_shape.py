@@ -10,13 +10,14 @@ from studies.base.errors import StudyError
 from studies.geometry import OrganMesh
 from studies.geometry.mesh.organ_mesh import triangle_areas
 from studies.geometry.surface.sides import along_facets, region_area
-from studies.meshing.bounds import FACETS, FEW, HELD_AREA, REFUSED_AREA, SIDE
+from studies.meshing.bounds import ADAPTIVE_WALL, FACETS, FEW, HELD_AREA, REFUSED_AREA, SIDE
 from studies.meshing.moving_tools import moments_of, moving_tools
 from studies.meshing.quadratic_mesh import QuadraticMesh
 from studies.meshing.rest_surface import OUTER, rest_surfaces
 from studies.meshing.scene_mesh import patch_nodes
 from studies.meshing.true_surface import shape_errors, true_surface
 from studies.scene.inertia import top_speed
+from studies.scene.kind import has_wall
 from studies.scene.organ_file import remeshed
 from studies.scene.scene import Held, Organ, Scene
 
@@ -51,12 +52,16 @@ def tell_shape(scene: Scene, mesh: OrganMesh | QuadraticMesh, filled: bool) -> N
         flat = "" if isinstance(mesh, QuadraticMesh) else ", or quadratic elements, whose sides follow the surface"
         what = f"{mesh.name}: the body at rest does not keep the shape of its organ"
         warnings.warn(f"{what}: {', '.join(faults)}; use more nodes{flat}", stacklevel=2)
-    few = touched_facets(scene, mesh)
-    if scene.held and few is not None and few < FACETS:
+
+
+def tell_contact(scene: Scene, mesh: OrganMesh | QuadraticMesh, adaptive: bool) -> None:
+    """Warns of a body, with an adaptive mesh or another, that a moving sphere or capsule touches with few facets."""
+    few, enough = touched_facets(scene, mesh), ADAPTIVE_WALL if adaptive and has_wall(scene) else FACETS
+    if scene.held and few is not None and few < enough:
         warnings.warn(
-            f"{mesh.name}: only about {max(few, 1.0):.0f} facets will touch the probe; below {FACETS} its force may be "
-            f"several percent off, below {FEW} tens of percent, to either side; use more nodes, or a quadratic body "
-            "with graded='adaptive'",
+            f"{mesh.name}: only about {max(few, 1.0):.0f} facets will touch the probe; below {enough} its force may be "
+            f"several percent off, below {FEW} tens of percent, to either side; use more nodes"
+            + ("" if adaptive else ", or a quadratic body with graded='adaptive'"),
             stacklevel=2,
         )
 

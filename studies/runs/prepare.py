@@ -214,11 +214,12 @@ def prepare(case: Case) -> Prepared:
     check_opens(scene, case.body)
     check_blades(scene, case.body.kind)
     mesh = mesh_of(scene, case.body)
-    from studies.meshing.kept_shape import check_reach, tell_shape  # imports the finite elements
+    from studies.meshing.kept_shape import check_reach, tell_contact, tell_shape  # imports the finite elements
 
     at_nodes = not isinstance(case.body, QuadraticBody) or case.body.contact == "nodes"
     check_reach(scene, mesh, at_nodes)
     tell_shape(scene, mesh, filled=isinstance(case.body, TetrahedralBody | QuadraticBody))
+    tell_contact(scene, mesh, adaptive=case.body.graded == ADAPTIVE)
     return prepared_on(case, mesh)
 
 
