@@ -19,7 +19,7 @@ def fine_under_tools(scene: Scene, body: HeldMesh, radii: float) -> HeldMesh:
     `radii` of it."""
     for _ in range(ROUNDS):
         x, outer = body.mesh.p.T, body.mesh.boundary_facets()
-        facets = body.mesh.facets.T[outer]
+        facets = np.asarray(body.mesh.facets).T[outer]
         sides = np.linalg.norm(x[facets] - x[np.roll(facets, 1, axis=1)], axis=2).max(axis=1)
         wide = np.zeros(len(facets), dtype=bool)
         for _, tool in moving_tools(scene):
@@ -27,7 +27,7 @@ def fine_under_tools(scene: Scene, body: HeldMesh, radii: float) -> HeldMesh:
             wide |= reached & (sides > radii * tool.radius)
         if not wide.any():
             break
-        body = body.bisected(np.unique(body.mesh.f2t[0, outer[wide]]))
+        body = body.bisected(np.unique(np.asarray(body.mesh.f2t)[0, outer[wide]]))
     return body
 
 
