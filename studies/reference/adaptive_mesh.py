@@ -44,6 +44,8 @@ LOOSE = NewtonSettings(force_tol=1e-4, penetration_tol=1e-3)
 STRAIN = 1.0
 """Largest predicted stretch minus 1 of an element at an outline. There it grows as 1/√h as elements shrink, until they
 are inverted (measured: docs/accuracy.md)."""
+AT_REST = 1e-6
+"""Largest stretch minus 1 of a body that nothing deforms: round-off."""
 STEP = 1.25
 """Factor by which the number of elements grows until there are enough surface nodes."""
 
@@ -116,7 +118,7 @@ def indicators_of(
     """Error indicator over its largest value, and largest principal stretch of the corners, both (ne,), of the elements
     of the coarse body, parts of those of `whole`, at the last checkpoint; the body is opened along the scene's cuts.
 
-    Raises StudyError if no equilibrium is found."""
+    Raises StudyError if no equilibrium is found, or one without deformation."""
     try:
         mesh = on_true_sides(scene, organ_mesh, whole, coarse)
         *held, wall = coarse.facets(mesh)
@@ -137,7 +139,13 @@ def indicators_of(
     corners = problem.mesh.t[:4].T
     before, after = (np.diff(at[corners], axis=1) for at in (rest, rest + x[: rest.size].reshape(-1, 3)))
     gradient = np.linalg.solve(before, after)  # rows are edges, so this is the deformation gradient transposed
-    return indicator / indicator.max(), np.linalg.svd(gradient, compute_uv=False)[:, 0]
+    stretch = np.linalg.svd(gradient, compute_uv=False)[:, 0]
+    if not stretch.max() > 1.0 + AT_REST:
+        raise StudyError(
+            f"scene '{scene.name}': the coarse body by which to adapt is not deformed at the last checkpoint; end with "
+            "a checkpoint under load, or choose graded=True"
+        )
+    return indicator / indicator.max(), stretch
 
 
 def least_edge(coarse: HeldMesh, stretch: np.ndarray) -> float:

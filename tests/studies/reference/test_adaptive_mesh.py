@@ -151,6 +151,14 @@ def test_scenes_without_such_a_solution_are_refused_by_name(scene, reason):
         mesh_of(scene, BODY)
 
 
+def test_a_body_that_is_let_go_before_the_end_is_a_sentence(mesh_cache):
+    """Not that too many nodes are asked for: no element has an error."""
+    bottom, top = BALL_CLAMPED.held
+    back = Trajectory((0.0, 1.0, 2.0), ((0.0, 0.0, 0.0), (0.0, 0.0, -0.005), (0.0, 0.0, 0.0)))
+    with pytest.raises(StudyError, match="not deformed at the last checkpoint; end with a checkpoint under load"):
+        adaptive_mesh(replace(BALL_CLAMPED, held=(bottom, replace(top, path=back))), 300)
+
+
 def test_a_coarse_body_without_an_equilibrium_is_a_sentence(monkeypatch):
     from reference_fem import SolveError
 
