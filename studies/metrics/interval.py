@@ -176,8 +176,10 @@ def _unlike(run: Run) -> str:
 
 
 def from_rest(*runs: Run) -> float:
-    """How far one of the bodies is from rest at the end, over its displacement [1]; 0 where none of them knows."""
-    return float(np.nan_to_num([run.record.attributes.get("unsettled", NAN) for run in runs]).max())
+    """How far one of the bodies is from rest at the end, over its displacement [1], or its swing, if that is more:
+    three shapes miss one whose period is their distance in time. 0 where none of them knows."""
+    signs = [run.record.attributes.get(sign, NAN) for run in runs for sign in ("unsettled", "swing")]
+    return float(np.nan_to_num(signs).max())
 
 
 def sentences(runs: Sequence[Run]) -> list[str]:

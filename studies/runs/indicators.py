@@ -35,7 +35,8 @@ SWINGS = 0.01
 """Bound of the swing at rest, and of the way to rest of a body that creeps: of displacements it is the target of the
 mean error."""
 SETTLES = 0.003
-"""The second of a body heavier than its tissue, which promises the end of a lighter one."""
+"""The second of a body heavier than its tissue, which promises the end of a lighter one. A ball that nearly topples
+over the small cap that holds it is 0.116 from rest with 0.134, and 0.039 with 0.042; its swing is 0.011 and 0.003."""
 SLOWEST = 0.9
 """Largest share of its way in one span that a body is taken to move in the next: with noise the ratio may be any."""
 LESS = "halve the step, or take a method with a smaller tolerance"
